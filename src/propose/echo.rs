@@ -3,9 +3,9 @@
 
 use crate::chip::SensorConfig;
 use crate::numerics::{normal_above, normal_density};
+use crate::photon::EchoWidth;
 use crate::ranging::{DepthOptions, EchoLight, Response};
 use crate::theory::significance::{Chances, Scan};
-use crate::units::Time;
 
 /// Bins that are looked at: more than any window and pulse have.
 const BINS: usize = 96;
@@ -42,7 +42,7 @@ impl Echo {
     /// Of `signal` photons a laser cycle before `background_hz`, for a sensor's macropixels.
     pub(super) fn new(
         config: &SensorConfig,
-        pulse_sigma: Time,
+        pulse: EchoWidth,
         signal: f64,
         background_hz: f64,
     ) -> Self {
@@ -50,7 +50,7 @@ impl Echo {
             bins: BINS,
             ..config.clone()
         };
-        let response = Response::new(&wide, 1.0 / config.clk_hz, pulse_sigma);
+        let response = Response::new(&wide, 1.0 / config.clk_hz, pulse);
         let sigma_bins = response.pulse_sigma_bins;
         let at = |phase: usize| {
             let offset = (phase as f64 + 0.5) / PHASES as f64 - 0.5;

@@ -108,7 +108,7 @@ impl Problem {
         Ok(Problem {
             signal_per_uj: budget.signal_per_pulse(goal.range_m, goal.reflectivity),
             background_hz: budget.background_hz(goal.reflectivity, goal.illuminance_klux)
-                + scene.lidar.dark_count_hz,
+                + scene.lidar.dark_counts_hz(),
             emission,
             most_counts: (0..=MOST_BIN_BITS as u32).map(most).collect(),
             areas: Mutex::default(),
@@ -206,12 +206,7 @@ impl Problem {
             ..SensorConfig::clone(&self.sensor)
         };
         let (signal, background_hz) = self.light(pulse_energy_uj);
-        Echo::new(
-            &config,
-            self.scene.pulse_resolution(),
-            signal,
-            background_hz,
-        )
+        Echo::new(&config, self.scene.echo_width(), signal, background_hz)
     }
 
     /// CLK periods to the end of the last window that is needed, and the bits of a P-counter that counts them.

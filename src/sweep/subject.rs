@@ -130,6 +130,10 @@ impl<'a> Subject<'a> {
         };
         if self.study.kind == Kind::Theory {
             let asked = of_theory.try_into().expect("every value has been checked");
+            if let Some(key) = world.scene.not_gaussian() {
+                let message = "theory is of Gaussian pulses; leave this out, or study frames";
+                return Err(InputError::new(format!("scene.lidar.{key}"), message));
+            }
             let wall = Box::new(Wall::new(world.rig, &asked));
             return Ok(Ready {
                 key: key(&format!("{wall:?}")),
@@ -397,6 +401,21 @@ mod tests {
             assert_eq!(same.len(), 2);
             assert!(same.iter().all(|s| std::ptr::eq(s.timing(), one.timing())));
         }
+    }
+
+    #[test]
+    fn theory_refuses_pulses_that_are_not_gaussian_by_their_key() {
+        let study = study(
+            "[study]\nkind = \"theory\"\n[fixed]\nscene.lidar.spad_tail_ps = 300\n[vary]\nscene.lidar.spad_tail_share = [0, 0.1]\n",
+        );
+        let subject = Subject::new(&study);
+        let ready = |index| subject.ready(&study.point(index), &mut Scratch::default());
+        assert!(ready(0).is_ok());
+        let refusal = ready(1).err().unwrap().to_string();
+        assert!(
+            refusal.contains("scene.lidar.spad_tail_share: theory is of Gaussian pulses"),
+            "{refusal}"
+        );
     }
 
     fn keys(text: &str) -> Vec<Key> {

@@ -23,10 +23,11 @@ pub use errors::Errors;
 pub use method::{GATE_CYCLES, Method};
 pub use summary::{Summary, Worst, summarise};
 
+use super::light::photon_stream;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Exposed, Gate, LitPixel, Window, expose,
-    expose_without_skipping, stream_config,
+    expose_without_skipping,
 };
 use crate::photon::{PhotonStream, PixelLight};
 use crate::scene::Scene;
@@ -158,8 +159,7 @@ impl ParetoSettings {
 
     fn stream(&self, laser_cycles: u32, seed: u64) -> PhotonStream {
         let exposure = self.exposure(laser_cycles);
-        let sigma = self.scene.pulse_sigma();
-        PhotonStream::new(&stream_config(&self.sensor, &exposure, seed, sigma))
+        photon_stream(&self.sensor, &exposure, seed, &self.scene)
     }
 
     fn run(&self, method: Method, cell: &Cell) -> Result<Exposed, EngineError> {

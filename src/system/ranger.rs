@@ -67,7 +67,7 @@ impl<'a> Ranger<'a> {
         calibration: Option<&'a BinProfile>,
     ) -> Result<Self, UnequalBins> {
         let law = WindowLaw::new(sensor, exposure);
-        let finder = EchoFinder::new(&law, scene.pulse_resolution(), options)?;
+        let finder = EchoFinder::new(&law, scene.echo_width(), options)?;
         Ok(Ranger {
             law,
             aims: Aims::new(sensor, exposure, calibration),

@@ -207,7 +207,7 @@ impl Circumstances<'_> {
         let Some((signal, light)) = self.brightest(reason) else {
             return 0.0;
         };
-        let response = Response::new(self.sensor, self.bin_s, self.scene.pulse_resolution());
+        let response = Response::new(self.sensor, self.bin_s, self.scene.echo_width());
         let chances = response.chances(&EchoLight {
             position_bins: (self.sensor.bins / 2) as f64,
             signal,

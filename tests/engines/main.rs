@@ -30,5 +30,6 @@ mod own_blocks_agree_with_built_in_ones;
 mod own_counters_remember_nothing;
 mod photons_drawn_are_those_of_the_exposure;
 mod random_libraries_count_alike;
+mod spads_have_a_timing_of_their_own;
 mod timed_agrees_with_gate;
 mod window_sees_what_the_full_stream_shows;

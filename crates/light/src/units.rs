@@ -12,6 +12,12 @@ pub const SPEED_OF_LIGHT_M_PER_S: f64 = 299_792_458.0;
 /// Planck's constant, J·s.
 pub const PLANCK_J_S: f64 = 6.626_070_15e-34;
 
+/// Boltzmann's constant, eV/K.
+pub const BOLTZMANN_EV_PER_K: f64 = 8.617_333_262e-5;
+
+/// 0 °C, K.
+pub const ZERO_CELSIUS_K: f64 = 273.15;
+
 /// Ranges as times of flight.
 pub trait TimeOfFlight: Copy {
     /// Round-trip time of flight to a target `range_m` metres away.

@@ -17,6 +17,7 @@ pub mod solar;
 mod spad;
 mod spad_grid;
 mod stream;
+mod tail;
 
 pub use avalanches::{Avalanches, Unknown, apply_dead_time};
 pub use budget::{Convention, PhotonBudget, Spot};
@@ -39,3 +40,4 @@ pub use stream::{
     PLACE_BITS, PhotonStream, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE, TIME_BITS,
     signal_rank, spad_of,
 };
+pub use tail::{DiffusionTail, EchoWidth, TAIL_REACH, late_edge};

@@ -16,9 +16,9 @@ use crate::units::Time;
 #[derive(Debug, Clone, PartialEq)]
 pub struct PulseShape {
     /// Time between samples, above 0.
-    step: Time,
+    pub(super) step: Time,
     /// Power at times 0, `step`, 2·`step`, …, in any unit.
-    samples: Arc<[f64]>,
+    pub(super) samples: Arc<[f64]>,
 }
 
 /// Why samples are no laser pulse.
@@ -75,7 +75,7 @@ impl PulseShape {
 
 impl PulseShape {
     /// Mean time of its photons, fs after its beginning.
-    pub(crate) fn mean_fs(&self) -> f64 {
+    pub fn mean_fs(&self) -> f64 {
         self.moments().0 * self.step.as_fs() as f64
     }
 
@@ -84,6 +84,16 @@ impl PulseShape {
         let (mean, square) = self.moments();
         let step_fs = self.step.as_fs() as f64;
         (square - mean * mean).max(0.0) * step_fs * step_fs
+    }
+
+    /// Power `steps` after its beginning.
+    pub(super) fn power_at(&self, steps: f64) -> f64 {
+        let first = steps as usize;
+        let ends = self.samples.get(first).zip(self.samples.get(first + 1));
+        match ends {
+            Some((from, to)) => from + (to - from) * (steps - first as f64),
+            None => *self.samples.get(first).unwrap_or(&0.0),
+        }
     }
 
     /// First and second moment, in steps.

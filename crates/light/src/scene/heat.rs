@@ -15,17 +15,13 @@ use super::curve::Measured;
 use super::settings::Lidar;
 use crate::numerics::integrate;
 use crate::photon::{Filter, FilterShape};
+use crate::units::{BOLTZMANN_EV_PER_K, ZERO_CELSIUS_K};
 
 /// Temperature of the lidar at which its keys hold, °C.
 pub(super) const REFERENCE_C: f64 = 25.0;
 
 /// The chip's junction is so much warmer, K. Chosen: the built-in library, whose delays the default scene has, is of 50 °C.
 const JUNCTION_RISE_K: f64 = 25.0;
-
-/// Boltzmann's constant, eV/K (exact in the SI).
-const BOLTZMANN_EV_PER_K: f64 = 8.617_333_262e-5;
-
-const ZERO_CELSIUS_K: f64 = 273.15;
 
 /// What the excess bias at 25 °C detects of what it could.
 const TRIGGERED: f64 = 0.9;
@@ -113,8 +109,6 @@ impl Lidar {
         self.through(breaks, line)
     }
 
-    /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
-    fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
     /// Detected photons of a joule of light at `nm`, relative to those of the laser's own light: by the filter, the detection efficiency
     /// and the energy of a photon.
     pub(super) fn detected_beside_own(&self, nm: f64) -> f64 {
@@ -122,6 +116,8 @@ impl Lidar {
         filter * self.relative_pde(nm) * nm / self.warm_wavelength_nm()
     }
 
+    /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
+    fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
         breaks.extend((-12..=12).map(|k| line.centre_nm + f64::from(k) * 0.25 * line.fwhm_nm));
         let reach_nm = 3.0 * line.fwhm_nm;
         breaks.retain(|nm| (nm - line.centre_nm).abs() <= reach_nm);

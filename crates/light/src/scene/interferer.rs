@@ -244,11 +244,12 @@ impl OtherLight {
         let [way_m, square_m2] = self.way_m;
         let of_way_s2 = (square_m2 - way_m * way_m).max(0.0) / SPEED_OF_LIGHT_M_PER_S.powi(2);
         let pulse_s = other.pulse_fwhm_ns * 1e-9 / (8.0 * std::f64::consts::LN_2).sqrt();
+        let jitter_s = scene.lidar.spad_jitter_s();
         (photons > LEAST_PHOTONS).then(|| PulseTrain {
             laser: other.law(self.interferer, scene.lidar.dither_ns),
             photons,
             delay: Time::from_s(way_m / SPEED_OF_LIGHT_M_PER_S),
-            sigma: Time::from_s((pulse_s * pulse_s + of_way_s2).sqrt()),
+            sigma: Time::from_s((pulse_s * pulse_s + jitter_s * jitter_s + of_way_s2).sqrt()),
         })
     }
 }
@@ -372,7 +373,6 @@ mod tests {
         assert!(others(&hidden, 16).iter().all(Vec::is_empty));
     }
 
-    /// Arrivals in the laser cycle of a laser of our rate, of one whose clock is fast, and where either laser dithers.
     /// Another wavelength gets through our filter as much as the filter says, and meets the efficiency that SPADs have there.
     #[test]
     fn another_wavelength_meets_our_filter() {
@@ -426,6 +426,7 @@ mod tests {
         );
     }
 
+    /// Arrivals in the laser cycle of a laser of our rate, of one whose clock is fast, and where either laser dithers.
     #[test]
     fn a_laser_of_our_rate_stands_still_until_a_clock_drifts_or_a_laser_dithers() {
         const CYCLES: u32 = 4000;

@@ -13,7 +13,7 @@
 //! are seen at an angle, and two for the distance. A uniform laser (Eq. 7) sends all macropixels the same energy, also those
 //! that see a smaller solid angle, so that of the signal only the lens's cosine is lost.
 
-use std::f64::consts::PI;
+use std::f64::consts::{LN_2, PI};
 
 use super::camera::PinholeCamera;
 use super::curve::{Curve, Measured};
@@ -21,7 +21,10 @@ use super::settings::{Lidar, Scene};
 use super::words::{BeamWord, PdeWord, VignettingWord};
 use crate::numerics::integrate;
 use crate::photon::solar::{spectral_irradiance, spectrum};
-use crate::photon::{Atmosphere, Filter, FilterShape, PhotonBudget, PulseShape, StreamConfig};
+use crate::photon::{
+    Atmosphere, DiffusionTail, EchoWidth, Filter, FilterShape, PhotonBudget, PulseShape,
+    StreamConfig,
+};
 use crate::settings::Fault;
 use crate::units::Time;
 
@@ -105,6 +108,21 @@ impl Lidar {
             spectral_irradiance(nm) * passed * nm / self.warm_wavelength_nm()
         };
         integrate(density, &breaks, 1e-10)
+    }
+
+    /// Standard deviation of the SPADs' Gaussian jitter, s.
+    pub(super) fn spad_jitter_s(&self) -> f64 {
+        self.spad_jitter_fwhm_ps * 1e-12 / (8.0 * LN_2).sqrt()
+    }
+
+    /// Avalanches that are late, if any.
+    fn diffusion_tail(&self) -> Option<DiffusionTail> {
+        let time = Time::from_s(self.spad_tail_ps * 1e-12);
+        let is_there = self.spad_tail_share > 0.0 && time > Time::ZERO;
+        is_there.then_some(DiffusionTail {
+            share: self.spad_tail_share,
+            time,
+        })
     }
 
     /// What a file may not ask for, beyond the range of each key.
@@ -272,7 +290,7 @@ impl Scene {
     }
 
     /// The measured laser pulse, whose times add to those of the Gaussian; `None` for a Gaussian alone.
-    pub(crate) fn pulse_shape(&self) -> Option<PulseShape> {
+    fn measured_pulse(&self) -> Option<PulseShape> {
         let curve = self.lidar.pulse.curve()?;
         let (first, last) = curve.ends();
         let points = &curve.points;
@@ -293,6 +311,31 @@ impl Scene {
         PulseShape::new(step, &powers).ok()
     }
 
+    /// What is detected of the laser pulse, whose times add to those of the Gaussian: the measured pulse, and late avalanches; `None` for a
+    /// Gaussian alone.
+    pub(crate) fn pulse_shape(&self) -> Option<PulseShape> {
+        let measured = self.measured_pulse();
+        match self.lidar.diffusion_tail() {
+            Some(tail) => Some(tail.shape(measured.as_ref(), self.pulse_sigma())),
+            None => measured,
+        }
+    }
+
+    /// The lidar's key by which what is detected of a pulse is not Gaussian, if it is not.
+    pub fn not_gaussian(&self) -> Option<&'static str> {
+        let is_measured = self.lidar.pulse.curve().is_some();
+        let measured = is_measured.then_some("pulse");
+        measured.or_else(|| self.lidar.diffusion_tail().map(|_| "spad_tail_share"))
+    }
+
+    /// How wide the echo of one place is, for ranging.
+    pub fn echo_width(&self) -> EchoWidth {
+        EchoWidth {
+            sigma: self.pulse_resolution(),
+            tail: self.lidar.diffusion_tail(),
+        }
+    }
+
     /// A photon stream with the measured laser pulse, if there is one, and the spread of its energy.
     pub fn with_pulse(&self, config: StreamConfig) -> StreamConfig {
         let pulse_shape = self.pulse_shape();
@@ -303,10 +346,12 @@ impl Scene {
         }
     }
 
-    /// Standard deviation of the whole laser pulse, measured shape and all.
+    /// Standard deviation of the whole laser pulse, measured shape and all jitter, without late avalanches.
     pub fn pulse_resolution(&self) -> Time {
         let sigma_fs = self.pulse_sigma().as_fs() as f64;
-        let own_fs2 = self.pulse_shape().map_or(0.0, |shape| shape.variance_fs2());
+        let own_fs2 = self
+            .measured_pulse()
+            .map_or(0.0, |shape| shape.variance_fs2());
         Time::from_fs((sigma_fs * sigma_fs + own_fs2).sqrt().round() as i64)
     }
 }
@@ -451,6 +496,36 @@ mod tests {
         let (half, whole) = (&lights(&half, 2)[0], &lights(&whole, 2)[0]);
         assert!((half.signal_per_cycle() / whole.signal_per_cycle() - 0.5).abs() < 1e-9);
         assert!((half.background_hz() / whole.background_hz() - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn late_avalanches_keep_the_mean_and_need_a_time_constant() {
+        for pulse in ["", "pulse = [[0, 0.0], [1, 1.0], [5, 0.0]]"] {
+            let keys =
+                format!("pulse_fwhm_ns = 0.5\n{pulse}\nspad_tail_share = 0.2\nspad_tail_ps = 800");
+            let scene = sphere(&keys);
+            let shape = scene.pulse_shape().unwrap();
+            let light = &lights(&scene, 1)[0];
+            let mean_fs = light.arrival().as_fs() as f64 + shape.mean_fs();
+            assert!((mean_fs - Time::of_flight(30.0).as_fs() as f64).abs() < 1e3);
+            assert_eq!(
+                scene.not_gaussian(),
+                Some(if pulse.is_empty() {
+                    "spad_tail_share"
+                } else {
+                    "pulse"
+                })
+            );
+        }
+        let usual = sphere("pulse_fwhm_ns = 0.5");
+        assert_eq!((usual.pulse_shape(), usual.not_gaussian()), (None, None));
+        let none = sphere("pulse_fwhm_ns = 0.5\nspad_tail_ps = 100");
+        assert_eq!(none.pulse_shape(), None);
+        let fault = Scene::parse("test", "[lidar]\nspad_tail_share = 0.1\n").unwrap_err();
+        assert!(
+            fault.to_string().contains("give spad_tail_ps, too"),
+            "{fault}"
+        );
     }
 
     #[test]

@@ -78,6 +78,13 @@ keys! {
         /// Full width at half maximum of the Gaussian pulse, jitter included; with a measured pulse, of the jitter
         /// alone.
         pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), from "thesis 6.4.2";
+        /// Full width at half maximum of the SPADs' Gaussian timing jitter, on top of the pulse's width.
+        spad_jitter_fwhm_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6),
+            from "none in the thesis; Sun et al. 2019 (doi 10.1109/JEDS.2019.2895151) have 110 ps in 180 nm CMOS";
+        /// Share of the photons whose carrier diffuses to the junction, so that the avalanche is late; cohort refuses them.
+        spad_tail_share: f64 = 0.0, in SHARE, from "none in the thesis; Cova et al. 1996 (doi 10.1364/AO.35.001956)";
+        /// Time constant of the exponential delay of these avalanches.
+        spad_tail_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), from "none in the thesis; Cova et al. 1996";
         /// Standard deviation of the laser's delay after STOP, on top of the pulse's width.
         trigger_jitter_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), from "none in the thesis";
         /// Laser pulse.
@@ -309,11 +316,12 @@ impl Scene {
         Some(DVec3::new(right * cosine, -sine, forward * cosine))
     }
 
-    /// Standard deviation of the laser pulse: its width at half maximum over 2·√(2·ln 2), and the trigger's jitter, whose variances
-    /// add.
+    /// Standard deviation of the Gaussian part of a detected photon's time: of the laser pulse, its width at half maximum over
+    /// 2·√(2·ln 2), of the trigger's jitter, and of the SPADs' jitter. Variances add.
     pub fn pulse_sigma(&self) -> Time {
         let pulse_s = self.lidar.pulse_fwhm_ns * 1e-9 / (8.0 * LN_2).sqrt();
-        Time::from_s(libm::hypot(pulse_s, self.lidar.trigger_jitter_ps * 1e-12))
+        let sent_s = libm::hypot(pulse_s, self.lidar.trigger_jitter_ps * 1e-12);
+        Time::from_s(libm::hypot(sent_s, self.lidar.spad_jitter_s()))
     }
 }
 
@@ -336,5 +344,7 @@ mod tests {
         assert!((scene.pulse_sigma().as_ns() - 1.0).abs() < 1e-6);
         scene.lidar.trigger_jitter_ps = 750.0;
         assert!((scene.pulse_sigma().as_ns() - 1.25).abs() < 1e-6);
+        scene.lidar.spad_jitter_fwhm_ps = 3e3 * (8.0 * LN_2).sqrt();
+        assert!((scene.pulse_sigma().as_ns() - 3.25).abs() < 1e-6);
     }
 }

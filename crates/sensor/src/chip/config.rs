@@ -9,7 +9,7 @@ use crate::netlist::{Conditions, Corner};
 use crate::photon::{MOST_SPADS, SpadGrid, count_bits};
 use crate::settings::Range::{Above, OneOf, Within};
 use crate::settings::{keys, words};
-use crate::units::{Frequency, Time};
+use crate::units::{BOLTZMANN_EV_PER_K, Frequency, Time, ZERO_CELSIUS_K};
 
 pub use super::blocks::{front_end::variants::FrontEnd, p_counter::variants::PCounter};
 
@@ -182,6 +182,11 @@ keys! {
         afterpulse_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
         /// Time constant of afterpulses after the dead time.
         afterpulse_time_ns: f64 ["ns"] = 5.0, in Within(0.0, 1e6);
+        /// Activation energy of the traps behind afterpulses: with the junction's temperature their time constant falls, and more are released within the dead time.
+        ///
+        /// At 50 degC, probability and time constant are those given.
+        afterpulse_activation_ev: f64 ["eV"] = 0.0, in Within(0.0, 2.0),
+            from "none in the thesis; Cova, Lacaita and Ripamonti, IEEE EDL 12 (1991) 685";
         /// Probability that an avalanche fires one of its SPAD's four neighbours.
         crosstalk_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
         /// Netlist that takes the correlation block's place, as p_counter_block; for the engines gate and cycle.
@@ -230,6 +235,9 @@ keys! {
     }
 }
 
+/// The largest `afterpulse_time_ns`, s.
+const LONGEST_AFTERPULSE_S: f64 = 1e-3;
+
 impl SensorConfig {
     /// CLK. The configuration must have passed [`SensorConfig::check`].
     pub fn clock(&self) -> Frequency {
@@ -243,6 +251,26 @@ impl SensorConfig {
             temperature_c: self.temperature_c.unwrap_or(usual.temperature_c),
             ..usual
         }
+    }
+
+    /// Afterpulses of the SPADs at the junction's temperature: their probability after an avalanche, and their time constant, s.
+    ///
+    /// A trap releases its carrier after a time that is exponential with the constant τ ~ exp(E/kT) (Cova, Lacaita and Ripamonti, IEEE Electron
+    /// Device Letters 12 (1991) 685). Of N carriers that an avalanche traps, N exp(−d/τ) outlast the dead time d. N stays what the keys say
+    /// at 50 °C; τ is at most the longest that can be given.
+    pub fn afterpulses(&self) -> (f64, f64) {
+        let (given, time_s) = (self.afterpulse_probability, self.afterpulse_time_ns * 1e-9);
+        let inverse = |celsius: f64| 1.0 / (BOLTZMANN_EV_PER_K * (celsius + ZERO_CELSIUS_K));
+        let (own, usual) = (self.conditions(), Conditions::default());
+        let colder = inverse(own.temperature_c) - inverse(usual.temperature_c);
+        let exponent = self.afterpulse_activation_ev * colder;
+        if exponent == 0.0 || time_s == 0.0 {
+            return (given, time_s);
+        }
+        let warm_s = (time_s * libm::exp(exponent)).min(LONGEST_AFTERPULSE_S);
+        let dead_s = self.dead_time().as_s();
+        let left = libm::exp(dead_s / time_s - dead_s / warm_s);
+        ((given * left).min(1.0), warm_s)
     }
 
     /// Deserialiser clock. The configuration must have passed [`SensorConfig::check`].

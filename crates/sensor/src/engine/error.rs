@@ -136,8 +136,8 @@ pub enum NotModelled {
     /// Neighbours that fire together, where events depend on how many do.
     #[error("crosstalk where an event takes more than one SPAD")]
     CrosstalkInCoincidence,
-    /// A laser pulse that is not Gaussian.
-    #[error("a measured laser pulse")]
+    /// A laser pulse that is not Gaussian as it is detected.
+    #[error("a measured laser pulse, or late avalanches of a diffusion tail")]
     MeasuredPulse,
     /// SPADs with a detection efficiency or dark count rate of their own.
     #[error("SPADs that differ")]

@@ -26,6 +26,7 @@ pub fn stream_config(
     pulse_sigma: Time,
 ) -> StreamConfig {
     let sensor = sensor.into();
+    let (afterpulse_probability, afterpulse_time_s) = sensor.afterpulses();
     StreamConfig {
         seed,
         clock: exposure.clock,
@@ -42,8 +43,8 @@ pub fn stream_config(
                 false => DeadTimeLaw::NonParalysable,
                 true => DeadTimeLaw::Paralysable,
             },
-            afterpulse_probability: sensor.afterpulse_probability,
-            afterpulse_time: Time::from_s(sensor.afterpulse_time_ns * 1e-9),
+            afterpulse_probability,
+            afterpulse_time: Time::from_s(afterpulse_time_s),
             crosstalk_probability: sensor.crosstalk_probability,
         },
     }

@@ -1,7 +1,7 @@
 //! The mean histogram of an echo: what dead time and one count a bin make of a known pulse.
 //!
 //! ```text
-//!   light      signal·(Gaussian about the arrival) + background, shared evenly by the SPADs
+//!   light      signal·(Gaussian about the arrival, late avalanches behind it) + background, shared evenly by the SPADs
 //!   SPAD       fires with rate light × chance that it is ready; then it is blind for the dead time
 //!   bin        counts in a laser cycle if as many SPADs fired in it as TYPE and THRESHOLD ask for
 //! ```
@@ -20,7 +20,7 @@ use super::counting::Counting;
 use super::spad_state::{Dead, Spad};
 use crate::chip::{EventType, SensorConfig};
 use crate::numerics::{Dual, normal_above, normal_density};
-use crate::units::Time;
+use crate::photon::{EchoWidth, TAIL_REACH, late_edge};
 
 /// Steps to a bin, at least.
 const STEPS: usize = 4;
@@ -40,7 +40,7 @@ pub(super) const PARAMETERS: usize = 4;
 /// Light on a macropixel, in mean photons that its SPADs would detect without dead time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EchoLight {
-    /// Centre of the echo, bins.
+    /// Centre of the echo, bins: the mean time of its photons.
     pub position_bins: f64,
     /// Photons of the echo in a laser cycle.
     pub signal: f64,
@@ -59,6 +59,14 @@ pub(super) enum Steps {
     Fine,
 }
 
+/// Photons whose avalanches are late ([`DiffusionTail`](crate::photon::DiffusionTail)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Tail {
+    share: f64,
+    /// Time constant.
+    bins: f64,
+}
+
 /// How a macropixel answers to light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
@@ -66,20 +74,26 @@ pub struct Response {
     pub(crate) bins: usize,
     /// Standard deviation of the pulse, bins.
     pub pulse_sigma_bins: f64,
+    tail: Option<Tail>,
     pub(super) counting: Counting,
     dead: Dead,
 }
 
 impl Response {
-    /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to Gaussian pulses of standard deviation `pulse_sigma`,
-    /// all jitter included.
-    pub fn new(config: &SensorConfig, bin_s: f64, pulse_sigma: Time) -> Self {
+    /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to pulses of this width, all jitter included.
+    pub fn new(config: &SensorConfig, bin_s: f64, pulse: impl Into<EchoWidth>) -> Self {
+        let pulse = pulse.into();
+        let (afterpulses, afterpulse_s) = config.afterpulses();
         let grid = config.spad_grid();
         // Each of four directions is as likely; at an edge there is nobody.
         let neighbours = 2.0 * grid.neighbours() as f64 / (4 * grid.spads()) as f64;
         Response {
             bins: config.bins,
-            pulse_sigma_bins: pulse_sigma.as_s() / bin_s,
+            pulse_sigma_bins: pulse.sigma.as_s() / bin_s,
+            tail: pulse.tail.map(|tail| Tail {
+                share: tail.share,
+                bins: tail.time.as_s() / bin_s,
+            }),
             counting: Counting {
                 event_type: config.event_type,
                 threshold: usize::from(config.threshold),
@@ -88,8 +102,8 @@ impl Response {
             dead: Dead {
                 time_bins: config.dead_time().as_s() / bin_s,
                 paralysable: config.paralysable,
-                afterpulses: config.afterpulse_probability,
-                afterpulse_bins: (config.afterpulse_time_ns * 1e-9 / bin_s).max(1e-9),
+                afterpulses,
+                afterpulse_bins: (afterpulse_s / bin_s).max(1e-9),
                 crosstalk: config.crosstalk_probability * neighbours,
             },
         }
@@ -141,10 +155,15 @@ impl Response {
         self.steps(light, Steps::Fine) > self.steps(light, Steps::Coarse)
     }
 
+    /// How long late avalanches come after the Gaussian pulse.
+    fn tail_bins(&self) -> f64 {
+        self.tail.map_or(0.0, |tail| TAIL_REACH * tail.bins)
+    }
+
     /// Steps to a bin.
     fn steps(&self, light: &EchoLight, steps: Steps) -> usize {
         let sigma = light.sigma_bins.max(1e-3);
-        let fires_once = self.dead.time_bins >= 2.0 * PULSE_REACH * sigma;
+        let fires_once = self.dead.time_bins >= 2.0 * PULSE_REACH * sigma + self.tail_bins();
         if steps == Steps::Coarse || fires_once && self.dead.time_bins >= 2.0 {
             return STEPS.max((2.0 / self.dead.time_bins).min(16.0).ceil() as usize);
         }
@@ -177,8 +196,12 @@ impl Response {
         let h = 1.0 / steps_per_bin as f64;
 
         // Light of the pulse on a SPAD until a time.
-        let centre = light.position_bins;
-        let (starts, ends) = (centre - PULSE_REACH * sigma, centre + PULSE_REACH * sigma);
+        let late = self.tail.map_or(0.0, |tail| tail.share * tail.bins);
+        let centre = light.position_bins - late;
+        let (starts, ends) = (
+            centre - PULSE_REACH * sigma,
+            centre + PULSE_REACH * sigma + self.tail_bins(),
+        );
         let seen = |time: f64| -> Dual<K> {
             if time <= starts || time >= ends {
                 let value = if time <= starts { 0.0 } else { signal };
@@ -186,13 +209,27 @@ impl Response {
             }
             let z = (time - centre) / sigma;
             let (share, density) = share_before(z);
+            if let Some(tail) = self.tail {
+                let [late, late_density, by_width] = late_edge(time - centre, sigma, tail.bins);
+                let both =
+                    |prompt: f64, late: f64| signal * (prompt + tail.share * (late - prompt));
+                let value = both(share, late);
+                let slopes = [
+                    -both(density / sigma, late_density),
+                    value,
+                    0.0,
+                    both(-z * density, by_width),
+                ];
+                return dual(value, slopes);
+            }
             let (value, by_place) = (signal * share, -signal * density / sigma);
             dual(value, [by_place, value, 0.0, by_place * z * sigma])
         };
         // Before the pulse the SPADs are as the background alone leaves them: nothing happens before it begins.
         let last = self.bins as f64 - 0.5;
         // Of an echo long before the first bin nothing is left.
-        let forgotten = -8.0 - 2.0 * self.dead.time_bins - 4.0 * PULSE_REACH * sigma;
+        let forgotten =
+            -8.0 - 2.0 * self.dead.time_bins - 4.0 * PULSE_REACH * sigma - 2.0 * self.tail_bins();
         let begin_bin = (starts + 0.5).clamp(forgotten, self.bins as f64).floor();
         let begin = begin_bin - 0.5;
         let mut chances = Vec::with_capacity(self.bins);

@@ -19,8 +19,8 @@ use super::peak::{Peak, PeakOptions, interpolate_at, median};
 use super::returns::{Found, Others, Return, Search};
 use super::walk::{Corrected, WalkCorrection, WalkLeft};
 use crate::chip::{Overflow, Tdc, WindowLaw};
+use crate::photon::EchoWidth;
 use crate::theory::significance::{Scan, Stretch};
-use crate::units::Time;
 
 /// How depths are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,7 +107,7 @@ const MOST_AT_END: f64 = 0.5;
 const SHORT: f64 = 0.4;
 
 impl EchoFinder {
-    /// For the bins of `law` and Gaussian pulses of standard deviation `pulse_sigma`.
+    /// For the bins of `law` and pulses of this width: a [`Time`](crate::units::Time) is the standard deviation of Gaussian ones.
     ///
     /// Range walk is taken out where bins are CLK periods, SPADs have lines of their own, and have recovered from one echo before
     /// the next window opens.
@@ -117,7 +117,7 @@ impl EchoFinder {
     /// [`EchoFinder::find_in`], and range walk stays in.
     pub fn new(
         law: &WindowLaw,
-        pulse_sigma: Time,
+        pulse: impl Into<EchoWidth>,
         options: &DepthOptions,
     ) -> Result<Self, UnequalBins> {
         let (config, exposure) = (law.sensor(), law.exposure());
@@ -126,7 +126,7 @@ impl EchoFinder {
             Tdc::DelayLine => config.delay_element().as_s(),
         };
         let laser_cycles = exposure.laser_cycles;
-        let response = Response::new(config, bin_s, pulse_sigma);
+        let response = Response::new(config, bin_s, pulse);
         let laser_cycle_bins = exposure.stop(1).as_s() / bin_s;
         let recovers = response.dead_time_bins() + config.bins as f64 <= laser_cycle_bins;
         let complement = response.complement();

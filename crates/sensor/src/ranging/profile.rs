@@ -50,13 +50,14 @@ pub struct OtherSensor {
 }
 
 /// Keys on which bins do not depend.
-const FREE: [&str; 13] = [
+const FREE: [&str; 14] = [
     "bin_bits",
     "overflow",
     "dead_time_ns",
     "paralysable",
     "afterpulse_probability",
     "afterpulse_time_ns",
+    "afterpulse_activation_ev",
     "crosstalk_probability",
     "event_type",
     "threshold",

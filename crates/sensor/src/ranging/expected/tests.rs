@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::theory::precision::cramer_rao;
+use crate::units::Time;
 use proptest::prelude::*;
 
 const PULSE_SIGMA: Time = Time::from_ps(1_911);

@@ -3,6 +3,7 @@
 use super::*;
 use crate::chip::{EventType, Exposure, FrontEnd, SensorConfig, hslidar_delay_line};
 use crate::ranging::{EchoLight, Response};
+use crate::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 const PULSE_SIGMA: Time = Time::from_ps(1_911);
