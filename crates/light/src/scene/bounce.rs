@@ -42,7 +42,7 @@ impl Scene {
         };
         let (lidar, cosine) = (&self.lidar, towards.z / towards.length());
         let pitch = [1.0 / camera.focal_px, 1.0 / camera.focal_v_px];
-        let pulse_j = lidar.pulse_energy_uj * 1e-6;
+        let pulse_j = lidar.warm_pulse_j();
         if let Some(beam) = lidar.beam_at(libm::acos(cosine)) {
             return pulse_j * beam / lidar.beam_total();
         }

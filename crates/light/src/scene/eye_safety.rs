@@ -332,7 +332,7 @@ impl Scene {
         let lidar = &self.lidar;
         let source = (lidar.warm_wavelength_nm(), lidar.laser_source_mm / 0.1);
         let per_sr = self.brightest_per_sr(&self.lidar_camera(rows, cols));
-        Emission::new(source, (lidar.pulse_energy_uj * 1e-6, per_sr), train)
+        Emission::new(source, (lidar.warm_pulse_j(), per_sr), train)
     }
 
     /// The largest share of a pulse that goes into a solid angle, 1/sr.

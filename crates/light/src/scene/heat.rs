@@ -72,6 +72,12 @@ impl Lidar {
         (self.pde * self.triggering() * of_wavelength).min(1.0)
     }
 
+    /// Energy of a pulse at its temperature, J.
+    pub fn warm_pulse_j(&self) -> f64 {
+        let grown = 1.0 + self.pulse_energy_drift_1_k * self.warmer_k();
+        self.pulse_energy_uj * 1e-6 * grown.max(0.0)
+    }
+
     /// The laser's wavelength at its temperature, nm.
     pub(super) fn warm_wavelength_nm(&self) -> f64 {
         self.wavelength_nm + self.laser_drift_nm_k * self.warmer_k()
@@ -187,6 +193,37 @@ mod tests {
             ..at(60.0)
         };
         assert_eq!((dead.dark_counts_hz(), dead.warm_pde()), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_warm_laser_has_less_energy_for_echoes_and_eyes() {
+        let scene = |celsius: f64, drift: f64| {
+            let keys = format!(
+                "[lidar]\ntemperature_c = {celsius}\npulse_energy_drift_1_k = {drift}\npulse_energy_uj = 20\n"
+            );
+            Scene::parse("test", &keys)
+        };
+        let (cold, hot) = (scene(25.0, -0.004).unwrap(), scene(75.0, -0.004).unwrap());
+        assert_eq!(cold.lidar.warm_pulse_j(), 20.0 * 1e-6);
+        let still = scene(75.0, 0.0).unwrap();
+        for (less, all) in [
+            (hot.lidar.warm_pulse_j(), still.lidar.warm_pulse_j()),
+            (
+                hot.photon_budget(8, 8).signal_per_pulse(30.0, 0.3),
+                still.photon_budget(8, 8).signal_per_pulse(30.0, 0.3),
+            ),
+            (
+                hot.emission(8, 8, 1e5, 1e5).pulse_j,
+                still.emission(8, 8, 1e5, 1e5).pulse_j,
+            ),
+        ] {
+            assert!((less / all - 0.8).abs() < 1e-12, "{less} {all}");
+        }
+        let fault = scene(75.0, -0.02).unwrap_err().to_string();
+        assert!(
+            fault.contains("leaves no light of the laser at 75 C"),
+            "{fault}"
+        );
     }
 
     #[test]

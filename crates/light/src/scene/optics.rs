@@ -136,6 +136,18 @@ impl Lidar {
             );
             return fault("filter", message);
         }
+        if self.pulse_energy_uj > 0.0 && self.warm_pulse_j() == 0.0 {
+            let message = format!(
+                "pulse_energy_drift_1_k = {} leaves no light of the laser at {} C; give a smaller one",
+                self.pulse_energy_drift_1_k, self.temperature_c
+            );
+            return fault("pulse_energy_drift_1_k", message);
+        }
+        if self.spad_tail_share > 0.0 && self.spad_tail_ps == 0.0 {
+            let message =
+                "spad_tail_share means nothing without a time constant; give spad_tail_ps, too";
+            return fault("spad_tail_share", message.into());
+        }
         if let Measured::Curve(curve) = &self.filter
             && curve.greatest() > 1.0
         {
@@ -247,7 +259,7 @@ impl Scene {
             pde: lidar.warm_pde(),
             wavelength_nm: lidar.warm_wavelength_nm(),
             transmittance: lidar.transmittance * lidar.laser_transmission(),
-            pulse_energy_j: lidar.pulse_energy_uj * 1e-6,
+            pulse_energy_j: lidar.warm_pulse_j(),
             lens_diameter_m,
             lens_focal_m,
             pixel_pitch_m: [camera.focal_px, camera.focal_v_px].map(|px| lens_focal_m / px),

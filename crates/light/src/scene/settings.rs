@@ -73,6 +73,9 @@ keys! {
         pulse_energy_uj: f64 ["uJ"] = 20.0,
             in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
             from CHOSEN;
+        /// Growth of a pulse's energy with temperature, as a share of pulse_energy_uj; negative for lasers at a fixed current.
+        pulse_energy_drift_1_k: f64 ["1/K"] = 0.0, in Within(-0.1, 0.1),
+            from "none in the thesis; Liao et al. 2016 (doi 10.4236/opj.2016.68B013), a diode of 940 nm";
         /// Standard deviation of a pulse's energy, relative to the mean; window takes some twice as long with it.
         pulse_energy_spread: f64 = 0.0, in Within(0.0, 0.5), from "none in the thesis";
         /// Full width at half maximum of the Gaussian pulse, jitter included; with a measured pulse, of the jitter
