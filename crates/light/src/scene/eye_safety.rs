@@ -242,7 +242,7 @@ impl Emission {
                 all[0],
                 |most, next| if next.2 > most.2 { next } else { most },
             );
-        let pulse_into_eye_j = self.into_aperture_j(band, within_s);
+        let pulse_into_eye_j = self.aperture_j(band, within_s);
         Some(EyeSafety {
             times_class_1,
             rule,
@@ -253,7 +253,7 @@ impl Emission {
     }
 
     /// Energy of a pulse through the aperture, J.
-    fn into_aperture_j(&self, band: Band, time_s: f64) -> f64 {
+    fn aperture_j(&self, band: Band, time_s: f64) -> f64 {
         let angle = 0.5 * band.aperture_m(time_s) / 0.1;
         self.pulse_j * (self.per_sr * PI * angle * angle).min(1.0)
     }
@@ -264,7 +264,7 @@ impl Emission {
             Band::Cornea1500 => 1.0,
             _ => (widest_mrad(time_s) / self.source_mrad).powi(2).min(1.0),
         };
-        share * self.into_aperture_j(band, time_s)
+        share * self.aperture_j(band, time_s)
     }
 
     /// Limit of the energy within `time_s`, T_i to 100 s, J (AEL, table 3).
@@ -590,7 +590,7 @@ mod tests {
         let into_eye = |text: &str| {
             let scene = Scene::parse("test", text).unwrap();
             let light = scene.emission(64, 64, steady(1.0));
-            light.into_aperture_j(Band::NearInfrared, 1.0) / light.pulse_j
+            light.aperture_j(Band::NearInfrared, 1.0) / light.pulse_j
         };
         let side = 2.0 * 8f64.to_radians().tan();
         let field = into_eye("[lidar]\nfov_deg = 16\n");

@@ -141,7 +141,7 @@ impl Lidar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
+    use crate::scene::{Scene, Train};
 
     fn at(celsius: f64) -> Lidar {
         let keys = format!("[lidar]\ntemperature_c = {celsius}\ndark_count_hz = 2e4\n");
@@ -206,6 +206,11 @@ mod tests {
         let (cold, hot) = (scene(25.0, -0.004).unwrap(), scene(75.0, -0.004).unwrap());
         assert_eq!(cold.lidar.warm_pulse_j(), 20.0 * 1e-6);
         let still = scene(75.0, 0.0).unwrap();
+        let train = Train {
+            rate_hz: 1e5,
+            pulses: 10.0,
+            frame_s: 1.0,
+        };
         for (less, all) in [
             (hot.lidar.warm_pulse_j(), still.lidar.warm_pulse_j()),
             (
@@ -213,8 +218,8 @@ mod tests {
                 still.photon_budget(8, 8).signal_per_pulse(30.0, 0.3),
             ),
             (
-                hot.emission(8, 8, 1e5, 1e5).pulse_j,
-                still.emission(8, 8, 1e5, 1e5).pulse_j,
+                hot.emission(8, 8, train).pulse_j,
+                still.emission(8, 8, train).pulse_j,
             ),
         ] {
             assert!((less / all - 0.8).abs() < 1e-12, "{less} {all}");

@@ -13,7 +13,7 @@
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use glam::{DVec3, Vec3A};
+use glam::DVec3;
 use obvhs::aabb::Aabb;
 
 use self::tree::{Bounds, Tree};
@@ -39,7 +39,7 @@ pub struct Mesh {
     /// The file it was read from.
     pub(crate) path: PathBuf,
     /// Corners of each triangle, in the tree's order.
-    triangles: Vec<[[f32; 3]; 3]>,
+    triangles: Vec<[[f64; 3]; 3]>,
     /// Texture coordinates of those corners; empty where the file has none.
     on_texture: Vec<[[f32; 2]; 3]>,
     /// Where in the file each triangle stands.
@@ -53,7 +53,7 @@ pub struct Mesh {
 /// The triangles of a file, as it lists them.
 #[derive(Default)]
 struct Listed {
-    corners: Vec<[f32; 3]>,
+    corners: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
     on_texture: Vec<[[f32; 2]; 3]>,
 }
@@ -163,10 +163,10 @@ impl Mesh {
             );
             return Err(complain(message));
         }
-        let is_number = |corner: &[f32; 3]| corner.iter().all(|v| v.abs() < 1e6);
+        let is_number = |corner: &[f64; 3]| corner.iter().all(|v| v.abs() < 1e9);
         if let Some(at) = listed.corners.iter().position(|corner| !is_number(corner)) {
             let message = format!(
-                "has its corner number {} at {:?}; give numbers below a million",
+                "has its corner number {} at {:?}; give numbers below 10⁹",
                 at + 1,
                 listed.corners[at]
             );
@@ -177,18 +177,21 @@ impl Mesh {
 
     fn of(path: &Path, listed: Listed) -> Self {
         let corners = |triangle: [u32; 3]| triangle.map(|corner| listed.corners[corner as usize]);
-        let mut all = Aabb::empty();
-        for &triangle in &listed.triangles {
-            all = all.union(&Aabb::from_points(
-                &corners(triangle).map(Vec3A::from_array),
-            ));
+        let used = || {
+            listed
+                .triangles
+                .iter()
+                .flat_map(|&triangle| corners(triangle))
+        };
+        let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for corner in used().map(DVec3::from_array) {
+            (least, most) = (least.min(corner), most.max(corner));
         }
-        let room = (all.max - all.min).max_element() * ROOM;
-        let (least, most) = (all.min - room, all.max + room);
-        let middle = (least.as_dvec3() + most.as_dvec3()) / 2.0;
+        let room = (most - least).max_element() as f32 * ROOM;
+        let (least, most) = (least - f64::from(room), most + f64::from(room));
+        let middle = (least + most) / 2.0;
         let grown = |&triangle: &[u32; 3]| {
-            let from_middle =
-                |corner: [f32; 3]| (DVec3::from_array(corner.map(f64::from)) - middle).as_vec3a();
+            let from_middle = |corner: [f64; 3]| (DVec3::from_array(corner) - middle).as_vec3a();
             let bounds = Aabb::from_points(&corners(triangle).map(from_middle));
             Bounds(Aabb::new(bounds.min - room, bounds.max + room))
         };
@@ -206,7 +209,7 @@ impl Mesh {
             numbers,
             tree,
             middle,
-            size: most.as_dvec3() - least.as_dvec3(),
+            size: most - least,
         }
     }
 
@@ -217,8 +220,7 @@ impl Mesh {
     }
 
     fn corners_of(&self, triangle: u32) -> [DVec3; 3] {
-        let corner = |corner: [f32; 3]| DVec3::from_array(corner.map(f64::from));
-        self.triangles[triangle as usize].map(corner)
+        self.triangles[triangle as usize].map(DVec3::from_array)
     }
 
     /// Where a ray in the mesh's own coordinates first meets it; the part is the triangle's place in the tree's order. Of two in the same
@@ -309,7 +311,7 @@ impl Mesh {
 
 /// A face that triangles from its first corner do not cover, by a corner of it as the file has it.
 #[derive(Debug)]
-struct ConcaveFace([f32; 3]);
+struct ConcaveFace([f64; 3]);
 
 impl Listed {
     fn of_models(models: Vec<tobj::Model>) -> Result<Self, ConcaveFace> {
@@ -324,7 +326,7 @@ impl Listed {
             let place = |index: u32| {
                 let at = 2 * index as usize;
                 // OBJ counts v upwards.
-                [read.texcoords[at], 1.0 - read.texcoords[at + 1]]
+                [read.texcoords[at], 1.0 - read.texcoords[at + 1]].map(|x| x as f32)
             };
             // Without a list of them all faces are triangles.
             let triangles = read.indices.len() / 3;
@@ -355,13 +357,11 @@ impl Listed {
 }
 
 /// Whether a polygon turns the other way at some corner. Its normal is Newell's.
-fn is_concave(corners: impl ExactSizeIterator<Item = [f32; 3]>) -> bool {
+fn is_concave(corners: impl ExactSizeIterator<Item = [f64; 3]>) -> bool {
     if corners.len() < 4 {
         return false;
     }
-    let corners: Vec<DVec3> = corners
-        .map(|corner| DVec3::from_array(corner.map(f64::from)))
-        .collect();
+    let corners: Vec<DVec3> = corners.map(DVec3::from_array).collect();
     let from_first = |n: usize| corners[n % corners.len()] - corners[0];
     let normal: DVec3 = (1..corners.len())
         .map(|n| from_first(n).cross(from_first(n + 1)))
@@ -370,7 +370,7 @@ fn is_concave(corners: impl ExactSizeIterator<Item = [f32; 3]>) -> bool {
         let [a, b, c] = [n, n + 1, n + 2].map(from_first);
         (b - a).cross(c - b).dot(normal)
     };
-    // Corners are rounded to single precision.
+    // Files round corners, often to single precision.
     let room = 1e-5 * normal.length_squared();
     (0..corners.len()).any(|n| turn(n) < -room)
 }

@@ -195,11 +195,7 @@ fn broken_files_are_refused_with_their_line() {
             None,
             "corner number 3",
         ),
-        (
-            "v 1 2 3\nv 1 2 4\nv 2 2 1e30\nf 1 2 3\n",
-            None,
-            "below a million",
-        ),
+        ("v 1 2 3\nv 1 2 4\nv 2 2 1e30\nf 1 2 3\n", None, "below 10⁹"),
         ("v 1 2 3\n", None, "no triangles"),
         ("", None, "no triangles"),
     ] {
@@ -242,4 +238,24 @@ proptest! {
         let _ = read(&text);
         let _ = read(&cut);
     }
+}
+
+/// A sheet a millimetre before another one, where surveys count metres from the equator.
+#[test]
+fn corners_far_from_the_origin_keep_their_millimetres() {
+    let far = [500_000.0, -4_500_000.0, -250.0];
+    let sheet = |z: f64| {
+        [[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]].map(|[x, y]| [far[0] + x, far[1] + y, far[2] - z])
+    };
+    let corners = [sheet(10.001), sheet(10.0)].concat();
+    let mesh = read(&obj_of(&corners, [vec![0, 1, 2], vec![3, 4, 5]])).unwrap();
+    // x right, y down, z forward.
+    let origin = DVec3::new(far[0], -far[1], -far[2]);
+    let ray = Ray {
+        origin,
+        direction: DVec3::Z,
+    };
+    let met = mesh.meet(&ray).unwrap();
+    assert!((met.range_m - 10.0).abs() < 1e-6, "{}", met.range_m);
+    assert_eq!(mesh.numbers[met.part as usize], 1);
 }
