@@ -66,6 +66,9 @@ fn cure(error: &EngineError, spelling: Spelling) -> Option<String> {
             "give less than {:.1} Mcounts/s (less light, a smaller or darker lens, a narrower filter, a shorter dead time), or fewer macropixels or laser cycles",
             most_hz / 1e6
         ),
+        EngineError::Flooded { .. } => {
+            "give less light (a smaller pulse_energy_uj, a darker or farther target, a thinner medium or a larger overlap_m)".to_owned()
+        }
         EngineError::OwnLaws => format!("use {}, cohort or gate", engine("window")),
         EngineError::Mismatch
         | EngineError::OtherSpads { .. }

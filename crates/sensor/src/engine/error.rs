@@ -78,6 +78,16 @@ pub enum EngineError {
         /// As many are simulated.
         most_photons: f64,
     },
+    /// An echo whose photons are held in memory has too many.
+    #[error(
+        "an echo has {photons:.1e} photons a laser cycle on a macropixel, of which {most_photons:.0e} are held in memory"
+    )]
+    Flooded {
+        /// Photons of the echo, on average.
+        photons: f64,
+        /// As many are held.
+        most_photons: f64,
+    },
     /// Each macropixel has delays of its own, and this engine has one set of them.
     #[error(
         "cells differ at random (mismatch), so that each macropixel has delays of its own, which only the engine with per-macropixel delays follows"

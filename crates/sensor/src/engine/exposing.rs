@@ -124,7 +124,32 @@ pub(super) fn refuse_other_spads(
     }
 }
 
+/// Photons of an echo that are held in memory at most: with those of 16 laser cycles 0.4 GB on each thread.
+const MOST_ECHO_PHOTONS: f64 = 1e6;
+
+/// Refuses echoes that do not fit into memory.
+fn refuse_floods(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
+    let lit = pixels
+        .iter()
+        .filter_map(|pixel| Some((pixel.number, pixel.light.as_ref()?)));
+    // Few have so many photons at all.
+    let flooded = lit.filter(|(_, light)| light.signal_per_cycle() > MOST_ECHO_PHOTONS);
+    for (number, light) in flooded {
+        for part in stream.parts(number, light) {
+            let photons = part.listed_photons();
+            if photons > MOST_ECHO_PHOTONS {
+                return Err(EngineError::Flooded {
+                    photons,
+                    most_photons: MOST_ECHO_PHOTONS,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
 fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
+    refuse_floods(stream, pixels)?;
     let config = stream.config();
     let spads = stream.spads() as f64;
     let most_hz = BLINDING / config.spads.dead_time.as_s();

@@ -165,6 +165,15 @@ impl<'a> PixelStream<'a> {
         is_echo || self.foreign.is_some()
     }
 
+    /// Photons of a laser cycle's echo that are held in memory at once for each of [`TILE`] laser cycles, on average.
+    pub fn listed_photons(&self) -> f64 {
+        if self.has_listed_echo() && self.foreign.is_none() {
+            self.signal_per_spad * self.stream.spads() as f64
+        } else {
+            0.0
+        }
+    }
+
     /// The block of background photons that is running `time_fs` after the start of a cycle.
     pub fn block_at(&self, time_fs: i64) -> u32 {
         let ends_fs = self.stream.ends_fs();
