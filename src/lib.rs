@@ -1,4 +1,12 @@
-#![cfg_attr(not(test), warn(unreachable_pub, clippy::disallowed_methods))]
+#![cfg_attr(
+    not(test),
+    warn(
+        unreachable_pub,
+        clippy::disallowed_methods,
+        clippy::print_stdout,
+        clippy::print_stderr
+    )
+)]
 #![doc = include_str!("tutorial.md")]
 //! # Modules
 //!

@@ -148,15 +148,15 @@ def test_copies_travel() -> None:
     ("ask", "says"),
     [
         (lambda: gdtof.Sensor(rows=0), "rows = 0 is impossible; give 1 to 256"),
-        (lambda: gdtof.Sensor(row=1), "unknown field `row`"),
+        (lambda: gdtof.Sensor(row=1), "unknown key `row`"),
         (lambda: gdtof.Sensor(clk_hz="8 ns"), "is a time; give a frequency"),
         (lambda: gdtof.Sensor().with_(rows="many"), "has an unknown unit; give a plain number"),
         (lambda: gdtof.Sensor.from_toml("rows = 0"), "sensor:1: rows = 0 is impossible"),
         (lambda: gdtof.Scene.from_toml("[lidar]\npde = 2", "mine"), "mine:2: in [lidar], pde = 2 is impossible; give 0 to 1"),
         (lambda: gdtof.Scene().with_({"object.cat.reflectivity": 1}), "there is no object \"cat\""),
-        (lambda: gdtof.Guide("radar:beam=3"), "unknown field `beam`"),
+        (lambda: gdtof.Guide("radar:beam=3"), "unknown key `beam`"),
         (lambda: gdtof.Guide(*["radar"] * 9), "9 guides; give 1 to 8"),
-        (lambda: gdtof.frame(engine="windo"), "engine: unknown variant `windo`"),  # type: ignore[arg-type]
+        (lambda: gdtof.frame(engine="windo"), "engine: `windo` is impossible"),  # type: ignore[arg-type]
         (lambda: gdtof.frame(laser_cycles=-1), "laser_cycles: -1 is impossible; give a whole number, 0 to 4294967295"),
         (lambda: gdtof.frame(stop_periods=2.5), "stop_periods: 2.5 is impossible; give a whole number, 0 to 4294967295"),  # type: ignore[arg-type]
         (lambda: gdtof.frame(stop_periods=520.0), "stop_periods: 520.0 is impossible; give 520, without a point"),  # type: ignore[arg-type]

@@ -100,7 +100,6 @@ pub(super) struct GuideArgs {
     /// Guide for the windows, such as radar or radar:range_sigma_m=0.2,azimuth_beam_deg=4 [default: stereo, the
     /// scene's camera pair]. Several are fused by their variances. `--help` lists all guides with their keys.
     #[arg(long = "guide", value_name = "NAME[:KEY=VALUE,…]", long_help = guides_in_full())]
-    /// Guides as they were given; none for the camera pair.
     pub(super) guides: Vec<String>,
     /// How windows are chosen, such as unguided=neighbour. `--help` lists all keys.
     #[arg(long, value_name = "KEY=VALUE,…", long_help = policy_in_full())]

@@ -6,11 +6,11 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::voice::{notes, progress, tell};
+use super::voice::{note, notes, progress, tell};
 use crate::demo::disturbed::{Disturbance, Outcome};
 use crate::demo::show::{Show, Shown};
 use crate::demo::{Demonstrator, limit, shows, sweep};
-use crate::files::{InputError, MANIFEST, ResultSet};
+use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::{BehaviouralStereo, Guide, options};
 use crate::report::{Grid, write_ply};
 use crate::units::Time;
@@ -41,6 +41,23 @@ enum Demo {
     Sign,
     /// A wall that throws laser light on a target.
     Corner,
+}
+
+/// Demos that take longer say so first.
+const LONG_S: f64 = 5.0;
+
+impl Demo {
+    /// Processor time with the calibration, s, of the release build on one thread, rounded up; the last two had not ended then.
+    fn processor_s(self) -> f64 {
+        match self {
+            Demo::Glass | Demo::Sweep => 9.0,
+            Demo::Fog | Demo::Yaw | Demo::Speed | Demo::Limit | Demo::Corner => 12.0,
+            Demo::Van => 20.0,
+            Demo::Night => 28.0,
+            Demo::Interference => 90.0,
+            Demo::Sign => 170.0,
+        }
+    }
 }
 
 /// Arguments of `gdtof demo`.
@@ -97,6 +114,14 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         .clone()
         .unwrap_or_else(|| PathBuf::from(format!("demo_{}", name.get_name())));
     let results = ResultSet::begin(&out, "demo")?;
+    let seconds = args.demo.processor_s() / rayon::current_num_threads() as f64;
+    if seconds > LONG_S {
+        note(format_args!(
+            "{} takes {seconds:.0} s or longer on {} threads",
+            name.get_name(),
+            rayon::current_num_threads()
+        ));
+    }
     let began = Instant::now();
     let bar = |what: &str, length: u64| {
         let template = format!("{what} {{bar:40}} {{pos}}/{{len}}, {{eta}} left");
@@ -187,6 +212,10 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     Ok(tell(text)?)
 }
 
+fn write_text(path: &Path, text: &str) -> Result<(), InputError> {
+    OutputFile::write_with(path, |out| out.write_all(text.as_bytes()))
+}
+
 fn file_names(folder: &Path) -> std::io::Result<String> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder)? {
@@ -206,7 +235,7 @@ fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<Stri
         write_ply(&folder.join(format!("{name}_{number:03}.ply")), points)?;
     }
     let json = serde_json::to_string_pretty(&shown.frames)?;
-    std::fs::write(folder.join(format!("{name}.json")), json + "\n")?;
+    write_text(&folder.join(format!("{name}.json")), &(json + "\n"))?;
     let [load_s, exposure_s, readout_s] = shown.chip_s.map(|s| s * 1e3);
     let mut text = format!(
         "{name}: guide {:.0} ms, load {load_s:.2} ms, exposure {exposure_s:.1} ms, readout {readout_s:.2} ms: {:.2} fps\n",
@@ -231,7 +260,7 @@ fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<Stri
 /// What 200 m at 25 fps take.
 fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(limits)?;
-    std::fs::write(folder.join("limit.json"), json + "\n")?;
+    write_text(&folder.join("limit.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(
         "laser | cycles | energy | stereo error | in window | right to a bin | wrong | no peak",
     );
@@ -262,7 +291,7 @@ fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String
 /// What a disturbance costs each scheme.
 fn write_disturbed(folder: &Path, name: &str, outcomes: &[Outcome]) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(outcomes)?;
-    std::fs::write(folder.join("outcomes.json"), json + "\n")?;
+    write_text(&folder.join("outcomes.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(&format!(
         "{name} | scheme | bins | wrong | no depth | mean error, m"
     ));
@@ -292,7 +321,7 @@ fn write_sweep(folder: &Path, points: &[sweep::SweepPoint]) -> anyhow::Result<St
         chart.write(&folder.join(format!("fig_{number}.svg")))?;
     }
     let json = serde_json::to_string_pretty(points)?;
-    std::fs::write(folder.join("sweep.json"), json + "\n")?;
+    write_text(&folder.join("sweep.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(
         "distance, m | depths | in window | mean error, m | sigma, m | RMS, m | guide RMS, m",
     );

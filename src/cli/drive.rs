@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
-use super::voice::{notes, progress, say, tell};
+use super::voice::{notes, progress, say_file, tell};
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
@@ -239,7 +239,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         .map_err(unwritable)?;
     notes(results.commit(&configuration)?);
     match args.json {
-        true => Ok(say(format_args!("{json}\n"))?),
+        true => Ok(say_file(format_args!("{json}\n"))?),
         false => Ok(tell(report.table(&args.out))?),
     }
 }

@@ -1,10 +1,11 @@
 //! A drive for Foxglove and other players: points, depths, pictures and windows as messages with Foxglove's schemas.
 
+use std::io::Read;
 use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::files::{InputError, OutputFile};
+use crate::files::{InputError, OutputFile, open_file};
 use crate::report::{Channel, CloudPoint, FLOATS, Mcap, SHORTS};
 use crate::scene::{DVec3, PinholeCamera};
 use crate::system::{DriveFrame, DriveSettings, cloud};
@@ -110,7 +111,11 @@ impl Foxglove {
         });
         let mut messages = vec![(TRANSFORM, transform), (POINTS, points), (DEPTHS, depths)];
         if let Some(picture) = picture {
-            let picture = base64(&std::fs::read(picture)?);
+            let mut bytes = Vec::new();
+            open_file(picture)
+                .map_err(std::io::Error::other)?
+                .read_to_end(&mut bytes)?;
+            let picture = base64(&bytes);
             messages.push((
                 PICTURE,
                 json!({"timestamp": time, "frame_id": "lidar", "data": picture, "format": "png"}),

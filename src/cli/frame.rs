@@ -26,6 +26,9 @@ use crate::waves::WaveFormat;
 /// Arguments of `gdtof frame`.
 #[derive(Args)]
 pub(super) struct FrameArgs {
+    /// Scene, instead of --scene.
+    #[arg(value_name = "SCENE", conflicts_with = "scene")]
+    world: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
@@ -73,7 +76,9 @@ pub(super) struct FrameArgs {
 ///
 /// # Errors
 /// Bad input, unwritable output, and what [`take_frame_by`] reports.
-pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
+pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
+    args.scene = args.scene.or_file(args.world.take());
+    let args = &args;
     let (sensor, scene) = args.scene.read()?;
     let pair = args.pair.take(&sensor, scene.clone(), &args.out)?;
     let scene = pair.as_ref().map_or(scene, |pair| pair.scene.clone());
@@ -99,13 +104,14 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     };
     let progress = progress(
         settings.sensor.pixels() as u64,
-        "exposing {bar:40} {pos}/{len} macropixels, {eta} left",
+        "{msg} {bar:40} {pos}/{len} macropixels, {eta} left",
     );
+    progress.set_message("guiding");
     let frame = take_frame_by(
         &settings,
         policy,
         |guide| {
-            progress.finish_and_clear();
+            progress.set_message("exposing");
             let pixels = match chosen {
                 Some(pixels) => pixels,
                 None => nearest_guided(guide).into_iter().collect(),
@@ -114,6 +120,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         },
         |macropixels| progress.inc(macropixels as u64),
     )?;
+    progress.set_message("writing");
 
     let pair_report = pair.as_ref().map(|pair| &pair.report);
     let name = scene_name(args);
@@ -127,7 +134,9 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     if let Some(pair) = &pair {
         pair.write(results.staging())?;
     }
-    notes(results.commit(&report.configuration)?);
+    let kept = results.commit(&report.configuration)?;
+    progress.finish_and_clear();
+    notes(kept);
     if args.json {
         say_json(&report)?;
     } else {

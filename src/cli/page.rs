@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::voice::{say_json, tell};
+use super::voice::{busy, say_json, tell};
 use crate::page::Page;
 use crate::report::Table;
 
@@ -39,8 +39,10 @@ struct Report<'a> {
 /// # Errors
 /// Bad input and unwritable output.
 pub(super) fn run(args: &PageArgs) -> anyhow::Result<()> {
+    let busy = busy("making the page");
     let page = Page::of(&args.folder, &args.folder, args.every as usize)?;
     page.write(&args.out)?;
+    drop(busy);
     let report = Report {
         page: &args.out,
         frames: page.frames,

@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::voice::{notes, progress, say_json, tell};
+use super::voice::{note, notes, progress, say_json, tell};
 use crate::chip::SensorConfig;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Axis, Chart, Grid, aligned, width};
@@ -346,11 +346,11 @@ impl Progress {
             .set((done + 1, if is_due { Some(now) } else { said }));
         if is_due {
             let seconds = (now - self.begin).as_secs();
-            eprintln!(
+            note(format_args!(
                 "{} of {} engines and walls after {seconds} s",
                 done + 1,
                 self.total
-            );
+            ));
         }
     }
 

@@ -3,12 +3,13 @@
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::{say, say_json};
+use super::voice::{busy, say_json, tell};
 use crate::analysis::{Capacitances, MacropixelPower};
 use crate::chip::{CellLibrary, Exposure, Mode, PCounter, SensorConfig};
 use crate::files::InputError;
 use crate::photon::{SpadEvent, apply_dead_time};
 use crate::report::Grid;
+use crate::request::{self, Spelling};
 use crate::units::Time;
 use rand_philox::splitmix64;
 
@@ -92,6 +93,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         Some(periods) => periods,
         None => (config.clk_hz / LASER_HZ).round() as u32,
     };
+    check_length(args, &config, stop_periods)?;
     let start = args.start.unwrap_or(config.largest_start() / 2 + 1);
     if start > config.largest_start() {
         let message = format!(
@@ -101,6 +103,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         );
         return Err(InputError::new(format!("--start {start}"), message).into());
     }
+    let busy = busy("counting toggles");
     let mut variants = Vec::new();
     let mut wanted = vec![(config.p_counter, config.mode)];
     for variant in [
@@ -139,10 +142,11 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
             power,
         });
     }
+    drop(busy);
     if args.json {
         return say_json(&variants);
     }
-    say(format_args!(
+    tell(format_args!(
         "Switching energy of a macropixel in a laser cycle of {stop_periods} CLK periods at {} MHz, pJ (share)\n{}",
         config.clk_hz / 1e6,
         table(&variants, config.pixels())
@@ -151,7 +155,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         .ok()
         .and_then(CellLibrary::from_file)
     {
-        say(format_args!(
+        tell(format_args!(
             "\nArea in the cells of {}, um2 (leakage, nW; energy of a laser cycle within cells + in what they drive, pJ)\n{}",
             library.liberty.name,
             silicon_table(&variants)
@@ -203,6 +207,42 @@ fn capacitances(args: &PowerArgs) -> Result<Capacitances, InputError> {
 }
 
 /// Pulses at times without a pattern, the same in every run.
+/// CLK periods that are simulated at most: 4800 take 6 ms of processor time, so this is two minutes.
+const MOST_CLK_PERIODS: u64 = 100_000_000;
+
+/// Pulses that are kept in memory at most, 16 bytes each.
+const MOST_PULSES: f64 = 1e8;
+
+/// Refuses what takes too long or too much memory.
+///
+/// # Errors
+/// More CLK periods or pulses than are simulated.
+fn check_length(
+    args: &PowerArgs,
+    config: &SensorConfig,
+    stop_periods: u32,
+) -> Result<(), InputError> {
+    request::exposure(config, stop_periods, args.laser_cycles, Spelling::Options)?;
+    let periods = u64::from(args.laser_cycles) * u64::from(stop_periods);
+    if periods > MOST_CLK_PERIODS {
+        let message = format!(
+            "{} laser cycles of {stop_periods} CLK periods are {periods:.1e} CLK periods, of which {MOST_CLK_PERIODS:.0e} are simulated in about two minutes; give fewer laser cycles",
+            args.laser_cycles,
+            periods = periods as f64,
+            MOST_CLK_PERIODS = MOST_CLK_PERIODS as f64,
+        );
+        return Err(InputError::new("--laser-cycles", message));
+    }
+    let pulses = args.counts_hz * periods as f64 / config.clk_hz;
+    if pulses > MOST_PULSES {
+        let message = format!(
+            "{pulses:.1e} counts are more than the {MOST_PULSES:.0e} that are simulated; give fewer"
+        );
+        return Err(InputError::new("--counts-hz", message));
+    }
+    Ok(())
+}
+
 fn pulses(config: &SensorConfig, exposure: &Exposure, counts_hz: f64) -> Vec<SpadEvent> {
     let end_fs = exposure.end().as_fs() as u64;
     let pulses = 0..(counts_hz * exposure.end().as_s()).round() as u64;

@@ -68,7 +68,7 @@ pub const READERS: &[(&str, Reader)] = &[
             Document::of("curve", Table::new()),
             path.with_extension("csv"),
         );
-        fs::write(&csv, fs::read(path).expect("a file of ours")).expect("a file of ours");
+        fs::copy(path, &csv).expect("a file of ours");
         said(scene.assign(&format!("lidar.pulse={:?}", csv.display()), "--set"))?;
         said(Scene::read(&scene))
     }),
@@ -141,7 +141,7 @@ fn beside<T, E: ToString>(
 ) -> Result<(), String> {
     let folder = path.with_extension("folder");
     fs::create_dir_all(&folder).expect("a folder of ours");
-    fs::write(folder.join(name), fs::read(path).expect("a file of ours")).expect("a file of ours");
+    fs::copy(path, folder.join(name)).expect("a file of ours");
     let read = said(read(&folder));
     fs::remove_dir_all(&folder).expect("a folder of ours");
     read

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::asked::WaveFormatOption;
 use super::sdf::annotated_timing;
 use super::settings::SiliconArgs;
-use super::voice::{note, progress, say_json};
+use super::voice::{aside, note, progress, say_json};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::{self, View};
@@ -139,7 +139,7 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let warning = timing.as_ref().and_then(VerdictReport::warning);
     // The other engines refuse what matters to them; the gates do not.
     if let (Some(warning), EngineKind::Gate) = (&warning, args.engine) {
-        eprintln!("gdtof: {warning}");
+        note(warning);
     }
     let needs_array =
         args.vcd.is_some() || args.saif.is_some() || args.sdf.is_some() || args.checks.is_some();
@@ -189,23 +189,23 @@ impl Summary {
     /// Says on standard error what the chip loses silently.
     fn tell(&self, config: &SensorConfig) {
         if let Some(coverage) = &self.time_keeping {
-            eprint!("{}", table(coverage));
+            aside(table(coverage));
         }
         let unmet = self.timing.as_ref().filter(|timing| !timing.met);
         if let (Some(timing), true) = (unmet, self.engine != EngineKind::Gate) {
-            eprintln!("gdtof: timing {}", timing.verdict);
+            note(format_args!("timing {}", timing.verdict));
         }
         let later_windows = |timing: &VerdictReport| timing.later_windows.clone();
         if let Some(text) = self.timing.as_ref().and_then(later_windows) {
             note(format_args!("note on timing: {text}"));
         }
         if self.photons_that_cancel > 0 {
-            eprintln!(
-                "gdtof: {} photons cancel: two of one SPAD within a CLK period ({}) undo each other in the front end; a dead time ({}) no shorter than the period prevents it",
+            note(format_args!(
+                "{} photons cancel: two of one SPAD within a CLK period ({}) undo each other in the front end; a dead time ({}) no shorter than the period prevents it",
                 self.photons_that_cancel,
                 config.clock().period(),
                 config.dead_time(),
-            );
+            ));
         }
     }
 }
@@ -249,7 +249,7 @@ fn replay_array(
                 checks: checks.report(simulation.netlist()),
                 events: &events.report,
             };
-            eprint!("{}{}", report.checks, report.events);
+            aside(format_args!("{}{}", report.checks, report.events));
             // Before the histograms, which unknown states may have spoilt: this says why.
             if let Some(path) = &args.checks_json {
                 OutputFile::write_with(path, |w| Ok(serde_json::to_writer_pretty(w, &report)?))?;

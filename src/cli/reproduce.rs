@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::voice::{notes, progress, say};
+use super::voice::{busy, notes, progress, say_json, tell};
 use crate::files::{InputError, OutputFile, ResultSet};
 use crate::reproduce::{self, Report, Selection};
 
@@ -47,14 +47,16 @@ pub(super) struct ReproduceArgs {
 /// Numbers that do not exist, unwritable output, and claims that leave their tolerance.
 pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     if !args.liberty.is_empty() {
+        let busy = busy("measuring");
         let table = reproduce::libraries(&args.liberty)?;
+        drop(busy);
         if let Some(folder) = &args.out {
             let set = ResultSet::begin(folder, "reproduce --liberty")?;
             let path = set.staging().join("libraries.csv");
             OutputFile::write_with(&path, |out| table.write_csv(out))?;
             notes(set.commit(&args.liberty)?);
         }
-        return Ok(say(table)?);
+        return Ok(tell(table)?);
     }
     let chosen = Selection {
         claims: args.claim.clone(),
@@ -85,7 +87,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     let set = args.out.as_ref().map(begin).transpose()?;
     let bar = progress(
         selection.parts() as u64,
-        "{bar:30} {pos}/{len} claims, tables, figures, measurements",
+        "{bar:30} {pos}/{len} claims, tables, figures, measurements, {elapsed}",
     );
     let report = reproduce::reproduce(&selection, || bar.inc(1));
     bar.finish_and_clear();
@@ -94,7 +96,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
         notes(set.commit(asked)?);
     }
     if args.json {
-        say(format_args!("{:#}\n", report.json()))?;
+        say_json(&report.json())?;
     } else {
         print(&report, args.out.as_deref())?;
     }
@@ -113,7 +115,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
 fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
     for result in &report.claims {
         let claim = &result.claim;
-        say(format_args!(
+        tell(format_args!(
             "Claim {}: {} ({}): {}\n{}",
             claim.number,
             claim.title,
@@ -122,47 +124,47 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
             reproduce::grid(&result.rows)
         ))?;
         for row in result.rows.iter().filter(|row| !row.notes().is_empty()) {
-            say(format_args!("  {}: {}\n", row.what, row.notes()))?;
+            tell(format_args!("  {}: {}\n", row.what, row.notes()))?;
         }
-        say("\n")?;
+        tell("\n")?;
     }
     for table in &report.tables {
-        say(format_args!(
+        tell(format_args!(
             "Table {}: {}\n{}\n",
             table.number, table.title, table.it
         ))?;
     }
     for figure in &report.figures {
-        say(format_args!("Fig. {}: {}\n", figure.number, figure.title))?;
+        tell(format_args!("Fig. {}: {}\n", figure.number, figure.title))?;
         if folder.is_none() {
-            say("  give --out DIR for the picture and its numbers\n")?;
+            tell("  give --out DIR for the picture and its numbers\n")?;
         }
     }
     for result in &report.measurements {
-        say(format_args!("{}\n", reproduce::heading(result)))?;
+        tell(format_args!("{}\n", reproduce::heading(result)))?;
         for note in &result.it.notes {
-            say(format_args!("  {note}\n"))?;
+            tell(format_args!("  {note}\n"))?;
         }
         for (_, title, grid) in result.tables() {
-            say(format_args!("\n{title}\n{grid}"))?;
+            tell(format_args!("\n{title}\n{grid}"))?;
         }
-        say("\n")?;
+        tell("\n")?;
     }
     if !report.slips.is_empty() {
-        say(format_args!("{}\n", reproduce::SLIPS_TITLE))?;
+        tell(format_args!("{}\n", reproduce::SLIPS_TITLE))?;
         for slip in &report.slips {
-            say(format_args!(
+            tell(format_args!(
                 "  {}: {}; but {}. Model: {}.\n",
                 slip.place, slip.printed, slip.against, slip.model
             ))?;
         }
-        say("\n")?;
+        tell("\n")?;
     }
     if !report.claims.is_empty() {
-        say(format_args!("{}\n", reproduce::tally(report)))?;
+        tell(format_args!("{}\n", reproduce::tally(report)))?;
     }
     if let Some(folder) = folder {
-        say(format_args!(
+        tell(format_args!(
             "page: {}\n",
             folder.join("report.html").display()
         ))?;

@@ -152,39 +152,39 @@ pub(super) fn annotated_timing(
         ));
     }
     for oddity in oddities(&sdf, config.corner) {
-        eprintln!("gdtof: {}:{}: {oddity}", sdf.source, oddity.line());
+        note(format_args!("{}:{}: {oddity}", sdf.source, oddity.line()));
     }
     let at = |skipped: &Skipped| {
         format!(
-            "gdtof: {}:{}: left out or approximated {} of: {}",
+            "{}:{}: left out or approximated {} of: {}",
             sdf.source, skipped.first_line, skipped.count, skipped.what
         )
     };
     for skipped in sdf.skipped.iter().chain(&result.notes) {
-        eprintln!("{}", at(skipped));
+        note(at(skipped));
     }
     if result.longest_wire_to_d_fs > 0 {
-        eprintln!(
-            "gdtof: the longest wire to D left out is {} fs",
+        note(format_args!(
+            "the longest wire to D left out is {} fs",
             result.longest_wire_to_d_fs
-        );
+        ));
     }
     let corner = config.corner;
     let values = sdf.values(corner);
     let others = Corner::ALL.map(|other| sdf.values(other));
     if let Some(most) = others.into_iter().max().filter(|&most| most > values) {
         let missing = most - values;
-        eprintln!(
-            "gdtof: {}: {missing} of {most} entries have no value for {} and leave the library's; the file has {}",
+        note(format_args!(
+            "{}: {missing} of {most} entries have no value for {} and leave the library's; the file has {}",
             sdf.source,
             corner_name(corner),
             corners(&sdf),
-        );
+        ));
     }
-    eprintln!(
-        "gdtof: {}: {} arcs, {} wires and {} timing checks annotated",
+    note(format_args!(
+        "{}: {} arcs, {} wires and {} timing checks annotated",
         sdf.source, result.arcs, result.wires, result.checks
-    );
+    ));
     Ok(timing)
 }
 

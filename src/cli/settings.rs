@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::voice::{note, say};
+use super::voice::{note, say_file};
 use crate::chip::sensors::{CHIPS, HSLIDAR_MOST_HZ};
 use crate::chip::{
     CellLibrary, Sensor, SensorConfig, Silicon, UnknownConditions, array, library_files,
@@ -152,6 +152,15 @@ impl SceneArgs {
     pub(super) fn read(&self) -> Result<(Sensor, Scene), InputError> {
         let (sensor, scene) = self.sources().read()?;
         self.sensor.warn_of_unusual(&sensor);
+        if let (Some(path), true) = (
+            &self.scene,
+            scene.objects.is_empty() && self.scene != Some("empty".into()),
+        ) {
+            note(format_args!(
+                "{} has no [[object]], so there is nothing to see; `gdtof scene` prints a scene with some",
+                path.display()
+            ));
+        }
         Ok((sensor, scene))
     }
 
@@ -170,7 +179,7 @@ impl SceneArgs {
 /// # Errors
 /// Bad input.
 pub(super) fn print_sensor(args: &SensorArgs) -> anyhow::Result<()> {
-    Ok(say(args.read()?.commented())?)
+    Ok(say_file(args.read()?.commented())?)
 }
 
 /// `gdtof scene`.
@@ -178,7 +187,7 @@ pub(super) fn print_sensor(args: &SensorArgs) -> anyhow::Result<()> {
 /// # Errors
 /// Bad input.
 pub(super) fn print_scene(args: &SceneArgs) -> anyhow::Result<()> {
-    Ok(say(args.read()?.1.commented())?)
+    Ok(say_file(args.read()?.1.commented())?)
 }
 
 // What the chip is made of and where it is operated: `--process`, `--voltage`, `--temperature`, `--mismatch`.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Command, ValueEnum};
 use clap_complete::Shell;
 
-use super::voice::{notes, say, tell};
+use super::voice::{notes, say_file, tell};
 use crate::chip::SensorConfig;
 use crate::files::{OutputFile, ResultSet};
 use crate::scene::Scene;
@@ -54,7 +54,7 @@ pub(super) struct SchemaArgs {
 pub(super) fn completion(args: &CompletionArgs, mut command: Command) -> anyhow::Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "gdtof", &mut script);
-    Ok(say(String::from_utf8_lossy(&script))?)
+    Ok(say_file(String::from_utf8_lossy(&script))?)
 }
 
 /// Writes manual pages.
@@ -96,5 +96,5 @@ pub(super) fn schema(args: &SchemaArgs) -> anyhow::Result<()> {
         File::Scene => Scene::schema(),
         File::Study => Study::schema(),
     };
-    Ok(say(format_args!("{schema:#}\n"))?)
+    Ok(say_file(format_args!("{schema:#}\n"))?)
 }

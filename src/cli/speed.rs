@@ -6,6 +6,7 @@
 //! neighbours disturb little; more threads only by the wall clock, which knows how they wait for each other. Both
 //! clocks count nanoseconds.
 
+use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
@@ -14,8 +15,9 @@ use clap::Args;
 use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 
-use super::voice::{progress, say, say_json};
+use super::voice::{progress, say_file, say_json, tell};
 use crate::engine::{Cohort, CohortOptions, Cycle, Expose, Replay, Window};
+use crate::files::read_text;
 use crate::photon::SpadEvent;
 use crate::report::Grid;
 use crate::system::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
@@ -200,7 +202,7 @@ pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     if let Some(subject) = &args.only {
         let subject = serde_json::from_str(subject).context("no figure to measure")?;
         let figure = measure(subject, args.runs)?;
-        say(format_args!("{}\n", serde_json::to_string(&figure)?))?;
+        say_file(format_args!("{}\n", serde_json::to_string(&figure)?))?;
         return Ok(());
     }
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -218,7 +220,7 @@ pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     if args.json {
         say_json(&figures)?;
     } else {
-        say(table(&figures))?;
+        tell(table(&figures))?;
     }
     Ok(())
 }
@@ -352,7 +354,7 @@ fn timed<T, E: std::error::Error + Send + Sync + 'static>(
 
 /// Largest resident memory of this process, KiB, where /proc tells.
 fn peak_kib() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let status = read_text(Path::new("/proc/self/status")).ok()?;
     let line = status
         .lines()
         .find_map(|line| line.strip_prefix("VmHWM:"))?;

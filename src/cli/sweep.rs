@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::voice::{note, notes, progress, tell};
+use super::voice::{counted, note, notes, progress, tell};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
@@ -91,9 +91,9 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
     let outcome = outcome.map_err(plain)?;
     let seconds = begin.elapsed().as_secs_f64();
     if outcome.spoilt_lines > 0 {
-        let lines = outcome.spoilt_lines;
         note(format_args!(
-            "{lines} lines of the journal are damaged; their points were taken anew"
+            "damaged in the journal: {}; their points were taken anew",
+            counted(outcome.spoilt_lines, "line")
         ));
     }
     let mut table = outcome_table(&study, &outcome, seconds);

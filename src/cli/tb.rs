@@ -1,6 +1,6 @@
 //! `gdtof tb`: lists and runs the testbenches; and the binaries `tb_*`, each of which runs one.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use super::SensorArgs;
 use super::asked::WaveFormatOption;
-use super::voice::{say, say_json};
+use super::voice::{complain, note, notes, progress, say_json, tell};
 use crate::chip::SensorConfig;
-use crate::files::{InputError, clean_up_when_interrupted, create_folder};
+use crate::files::{InputError, ResultSet, clean_up_when_interrupted, instead_of};
 use crate::report::{Checks, Grid};
 use crate::request::sign_files;
 use crate::testbenches::{TESTBENCHES, Testbench};
@@ -30,9 +30,14 @@ struct WaveArgs {
 }
 
 impl WaveArgs {
-    fn path(&self, testbench: &Testbench) -> PathBuf {
+    fn file(&self, testbench: &Testbench) -> String {
         let extension = WaveFormat::from(self.wave_format).extension();
-        self.out.join(format!("{}.{extension}", testbench.name))
+        format!("{}.{extension}", testbench.name)
+    }
+
+    /// Waveforms of other testbenches stay.
+    fn begin(&self) -> Result<ResultSet, InputError> {
+        Ok(ResultSet::begin(&self.out, "tb")?.beside_others())
     }
 }
 
@@ -85,22 +90,12 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
     let sensor = args.sensor.given()?;
     let sensor = sensor.as_deref();
     let testbenches = chosen(&args.names, sensor)?;
-    if !args.list {
-        create_folder(&args.waves.out)?;
-    }
-    let entry = |testbench: &Testbench| {
-        let result = match args.list {
-            true => None,
-            false => Some(run_one(testbench, sensor, &args.waves.path(testbench))?),
-        };
-        Ok(Entry {
-            name: testbench.name,
-            about: testbench.about,
-            result,
-        })
+    let entries = if args.list {
+        let listed = |testbench| Entry::new(testbench, None);
+        testbenches.iter().map(listed).collect()
+    } else {
+        run_all(&testbenches, sensor, &args.waves)?
     };
-    let entries: Result<Vec<Entry>, InputError> = testbenches.par_iter().map(entry).collect();
-    let entries = entries?;
     let results = || entries.iter().filter_map(|entry| entry.result.as_ref());
     if args.json {
         say_json(&entries)?;
@@ -110,13 +105,13 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
                 continue;
             };
             if args.verbose || !result.passed {
-                say(format_args!("{}\n{}\n", entry.name, result.checks))?;
+                tell(format_args!("{}\n{}\n", entry.name, result.checks))?;
             }
         }
-        say(table(&entries))?;
+        tell(table(&entries))?;
         if let Some(first) = results().next() {
             let view = first.waveform.with_extension("gtkw");
-            say(format_args!(
+            tell(format_args!(
                 "waveforms: gtkwave {}, for example\n",
                 view.display()
             ))?;
@@ -147,8 +142,8 @@ fn chosen(names: &[String], sensor: Option<&SensorConfig>) -> Result<Vec<Testben
     let mut chosen: Vec<Testbench> = Vec::new();
     for name in names {
         let testbench = Testbench::named(name).ok_or_else(|| {
-            let all: Vec<&str> = TESTBENCHES.iter().map(|tb| tb.name).collect();
-            InputError::new(name, format!("is not a testbench; give {}", all.join(", ")))
+            let instead = instead_of(name, TESTBENCHES.iter().map(|tb| tb.name));
+            InputError::new(name, format!("is not a testbench; {instead}"))
         })?;
         if !drives(&testbench) {
             let message = format!("does not drive a sensor that is given; give {any}");
@@ -161,19 +156,54 @@ fn chosen(names: &[String], sensor: Option<&SensorConfig>) -> Result<Vec<Testben
     Ok(chosen)
 }
 
+impl Entry {
+    fn new(testbench: &Testbench, result: Option<RunResult>) -> Self {
+        Entry {
+            name: testbench.name,
+            about: testbench.about,
+            result,
+        }
+    }
+}
+
+fn run_all(
+    testbenches: &[Testbench],
+    sensor: Option<&SensorConfig>,
+    waves: &WaveArgs,
+) -> Result<Vec<Entry>, InputError> {
+    let set = waves.begin()?;
+    let bar = progress(
+        testbenches.len() as u64,
+        "running {bar:30} {pos}/{len} testbenches, {elapsed}",
+    );
+    let entry = |testbench: &Testbench| {
+        let result = run_one(testbench, sensor, waves, &set)?;
+        bar.inc(1);
+        Ok(Entry::new(testbench, Some(result)))
+    };
+    let entries: Result<Vec<Entry>, InputError> = testbenches.par_iter().map(entry).collect();
+    bar.finish_and_clear();
+    let entries = entries?;
+    let names: Vec<&str> = entries.iter().map(|entry| entry.name).collect();
+    notes(set.commit(names)?);
+    Ok(entries)
+}
+
 fn run_one(
     testbench: &Testbench,
     sensor: Option<&SensorConfig>,
-    waves: &Path,
+    waves: &WaveArgs,
+    set: &ResultSet,
 ) -> Result<RunResult, InputError> {
     let begin = Instant::now();
-    let checks = testbench.run(sensor, waves)?;
+    let file = waves.file(testbench);
+    let checks = testbench.run(sensor, &set.staging().join(&file))?;
     Ok(RunResult {
         passed: checks.passed(),
         checked: checks.made(),
         failed: checks.failed(),
         run_time_s: begin.elapsed().as_secs_f64(),
-        waveform: waves.to_owned(),
+        waveform: waves.out.join(file),
         checks,
     })
 }
@@ -219,23 +249,24 @@ pub fn testbench(name: &'static str) -> ExitCode {
     let args = OneArgs::from_arg_matches(&command.get_matches());
     let args = args.unwrap_or_else(|error| error.exit()).waves;
     if let Err(error) = clean_up_when_interrupted() {
-        eprintln!("{name}: signals cannot be watched ({error})");
+        note(format_args!("signals cannot be watched ({error})"));
     }
-    let waves = args.path(&testbench);
-    let result = create_folder(&args.out).and_then(|()| testbench.run(None, &waves));
-    match result {
-        Ok(checks) => {
-            let view = waves.with_extension("gtkw");
-            let text = format!("{checks}waveform: gtkwave {}\n", view.display());
+    match run_all(&[testbench], None, &args) {
+        Ok(entries) => {
+            let result = entries.iter().find_map(|entry| entry.result.as_ref());
+            let result = result.expect("it has run");
+            let view = result.waveform.with_extension("gtkw");
+            let text = format!("{}waveform: gtkwave {}\n", result.checks, view.display());
             // A reader that has gone away changes no verdict.
-            let _ = say(text);
-            match checks.passed() {
-                true => ExitCode::SUCCESS,
-                false => ExitCode::FAILURE,
+            let _ = tell(text);
+            if result.passed {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
             }
         }
         Err(error) => {
-            eprintln!("{name}: {error}");
+            complain(error);
             ExitCode::from(2)
         }
     }

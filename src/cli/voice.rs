@@ -1,15 +1,28 @@
-//! What the command says: data that was asked for, what was done, and how far it is.
+//! What the command says, and how far it is. All of it comes through here: clippy refuses other prints.
 //!
-//! `--quiet` leaves only the first, and errors. Progress shows on a terminal alone.
+//! | function | where | with `--quiet` |
+//! |---|---|---|
+//! | [`complain`] | standard error | yes |
+//! | [`say_json`], [`say_file`]: what a program or a file takes | standard output | yes |
+//! | [`tell`]: tables and sentences about what was done | standard output | no |
+//! | [`note`], [`aside`] | standard error | no |
+//! | [`progress`], [`busy`] | standard error, if it is a terminal | no |
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::fmt::Display;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use serde::Serialize;
 
+use crate::files::in_words;
+
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// How often a bar is drawn where nothing is done meanwhile.
+const TICK: Duration = Duration::from_millis(200);
 
 /// For the rest of the run.
 pub(super) fn be_quiet() {
@@ -20,11 +33,22 @@ fn is_quiet() -> bool {
     IS_QUIET.load(Ordering::Relaxed)
 }
 
-/// Writes data to standard output, whose reader may have gone away.
-pub(super) fn say(text: impl Display) -> std::io::Result<()> {
+/// Writes to standard output, whose reader may have gone away.
+fn say(text: impl Display) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
-    write!(out, "{text}")?;
-    out.flush()
+    let written = write!(out, "{text}").and_then(|()| out.flush());
+    written.map_err(|error| {
+        let said = format!("standard output cannot be written ({})", in_words(&error));
+        std::io::Error::new(error.kind(), said)
+    })
+}
+
+/// Writes the text of a file: settings, a script, histograms as CSV.
+///
+/// # Errors
+/// Those of standard output.
+pub(super) fn say_file(text: impl Display) -> std::io::Result<()> {
+    say(text)
 }
 
 /// Writes data as JSON, for a machine to read.
@@ -36,12 +60,22 @@ pub(super) fn say_json(data: &(impl Serialize + ?Sized)) -> anyhow::Result<()> {
     Ok(say(format_args!("{text}\n"))?)
 }
 
-/// Writes to standard output what was done, where the results are files.
+/// Writes a table or a sentence about what was done.
+///
+/// # Errors
+/// Those of standard output.
 pub(super) fn tell(text: impl Display) -> std::io::Result<()> {
     if is_quiet() {
         return Ok(());
     }
     say(text)
+}
+
+/// What is wrong, a line each.
+pub(super) fn complain(text: impl Display) {
+    for line in text.to_string().lines() {
+        eprintln!("gdtof: {line}");
+    }
 }
 
 /// A note on standard error.
@@ -56,12 +90,38 @@ pub(super) fn notes(sentences: Vec<String>) {
     sentences.iter().for_each(note);
 }
 
-/// A bar of `length` steps, in a template of `indicatif`.
+/// A table on standard error, where standard output has data.
+pub(super) fn aside(text: impl Display) {
+    if !is_quiet() {
+        eprint!("{text}");
+    }
+}
+
+/// A bar of `length` steps, in a template of `indicatif`. It goes when it is dropped.
 pub(super) fn progress(length: u64, template: &str) -> ProgressBar {
+    shown(ProgressBar::new(length), template)
+}
+
+/// What is being done where nobody knows how far it is, and for how long already. It goes when it is dropped.
+pub(super) fn busy(what: &str) -> ProgressBar {
+    shown(
+        ProgressBar::new_spinner(),
+        &format!("{what} {{spinner}} {{elapsed}}"),
+    )
+}
+
+fn shown(bar: ProgressBar, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template).expect("a template that indicatif knows");
-    let bar = ProgressBar::new(length).with_style(style);
+    let bar = bar.with_style(style).with_finish(ProgressFinish::AndClear);
     if is_quiet() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
+    bar.enable_steady_tick(TICK);
     bar
+}
+
+/// `1 line`, `3 lines`.
+pub(super) fn counted(number: u64, noun: &str) -> String {
+    let s = if number == 1 { "" } else { "s" };
+    format!("{number} {noun}{s}")
 }

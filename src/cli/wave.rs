@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::asked;
-use super::voice::{note, say, say_json};
+use super::voice::{note, say_json, tell};
 use crate::engine::late_cycle;
 use crate::engine::waveform::{self, View};
 use crate::files::InputError;
@@ -54,6 +54,10 @@ struct Report {
 /// # Errors
 /// Bad input and unwritable output.
 pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
+    if !args.frame.exists() {
+        let message = "does not exist; run `gdtof frame` first, or give the file of another frame with --frame";
+        return Err(InputError::new(args.frame.display(), message).into());
+    }
     let frame = TakenFrame::read(&args.frame)?;
     let (sensor, exposure) = (&frame.settings.sensor, &frame.settings.exposure);
     let at = asked::pixel("--pixel", &args.pixel, sensor)?;
@@ -117,5 +121,5 @@ pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
         format!("{} to {}", origin + from, origin + to),
     );
     let view = report.waveform.with_extension("gtkw");
-    Ok(say(format_args!("{table}gtkwave {}\n", view.display()))?)
+    Ok(tell(format_args!("{table}gtkwave {}\n", view.display()))?)
 }

@@ -10,13 +10,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::FrameRequest;
 use crate::analysis::VerdictReport;
 use crate::chip::{Mode, SensorConfig, WindowLaw, library_files};
 use crate::engine::{Work, variance_left_out};
-use crate::files::{InputError, OutputFile, parse_json};
+use crate::files::{InputError, OutputFile, file_hash, parse_json};
 use crate::report::{Cell, DepthMap, write_npy_u16};
 use crate::scene::{EyeSafety, Scene, Train};
 use crate::system::{
@@ -106,12 +105,6 @@ impl FrameRequest {
     }
 }
 
-/// The hash of a file, SHA-256 in hexadecimal digits, if it can be read.
-pub(crate) fn file_hash(path: &Path) -> Option<String> {
-    let digest = Sha256::digest(std::fs::read(path).ok()?);
-    Some(digest.iter().map(|byte| format!("{byte:02x}")).collect())
-}
-
 /// Hashes of the files that a sensor is made of.
 fn hashes(sensor: &SensorConfig) -> BTreeMap<String, String> {
     let libraries = [&sensor.liberty, &sensor.liberty_slow, &sensor.liberty_fast];
@@ -120,7 +113,7 @@ fn hashes(sensor: &SensorConfig) -> BTreeMap<String, String> {
         .flat_map(|setting| library_files(setting));
     let blocks = sensor.own_files().map(|(_, own)| own.path().to_owned());
     let files = libraries.chain(blocks);
-    let hash = |file: PathBuf| Some((file.display().to_string(), file_hash(&file)?));
+    let hash = |file: PathBuf| Some((file.display().to_string(), file_hash(&file).ok()?.1));
     files.filter_map(hash).collect()
 }
 

@@ -14,7 +14,7 @@ use super::Spelling;
 use crate::chip::own_block::replaceable;
 use crate::chip::sensors::CHIPS;
 use crate::chip::{Sensor, SensorConfig};
-use crate::files::InputError;
+use crate::files::{InputError, instead_of};
 use crate::scene::Scene;
 use crate::settings::Document;
 
@@ -54,7 +54,7 @@ impl Sources {
     /// Unreadable files, bad keys and values.
     pub fn read(&self) -> Result<(Sensor, Scene), InputError> {
         let mut document = match &self.scene {
-            Some(path) => scene_document(path)?,
+            Some(path) => scene_document(path, self.spelling)?,
             None => Scene::outdoor_document(),
         };
         let sensor = self.read_sensor_with(Some(&mut document));
@@ -70,7 +70,7 @@ impl Sources {
 
     fn read_sensor_with(&self, mut scene: Option<&mut Document>) -> Result<Sensor, InputError> {
         let mut sensor = match &self.sensor {
-            Some(path) => described(path)?,
+            Some(path) => described(path, self.spelling)?,
             None => Document::of("the sensor", toml::Table::new()),
         };
         for assignment in &self.set {
@@ -100,8 +100,9 @@ impl Sources {
             let Some((name, file)) =
                 given.filter(|(name, _)| replaceable().any(|block| block == *name))
             else {
-                let all: Vec<String> = replaceable().map(|name| format!("{name}=FILE")).collect();
-                let message = format!("is no block; give {}", all.join(" or "));
+                let name = block.split('=').next().unwrap_or_default();
+                let instead = instead_of(name, replaceable());
+                let message = format!("is no BLOCK=FILE with a block; {instead}");
                 return Err(InputError::new(option, message));
             };
             // A path in a sensor file is relative to that.
@@ -146,32 +147,90 @@ fn is_name(path: &Path) -> bool {
 }
 
 /// A scene file, or a built-in scene.
-fn scene_document(path: &Path) -> Result<Document, InputError> {
+fn scene_document(path: &Path, spelling: Spelling) -> Result<Document, InputError> {
     if !is_name(path) {
-        return Document::load(path);
+        let document = Document::load(path)?;
+        refuse_other(&document, path, Kind::Scene, spelling)?;
+        return Ok(document);
+    }
+    if path.to_str().and_then(Sensor::named).is_some() {
+        return Err(is_other(path, Kind::Sensor, spelling));
     }
     let named = path.to_str().and_then(Scene::built_in_document);
     named.ok_or_else(|| {
-        let names: Vec<&str> = Scene::built_in().map(|(name, _)| name).collect();
-        let message = format!(
-            "is neither a file nor a built-in scene; give {}, or a file",
-            names.join(" or ")
-        );
+        let given = path.to_string_lossy();
+        let instead = instead_of(&given, Scene::built_in().map(|(name, _)| name));
+        let message = format!("is neither a file nor a built-in scene; {instead}");
         InputError::new(path.display(), message)
     })
 }
 
+/// Refuses settings that are those of something else.
+fn refuse_other(
+    document: &Document,
+    path: &Path,
+    wanted: Kind,
+    spelling: Spelling,
+) -> Result<(), InputError> {
+    match kind_of(&document.table) {
+        Some(kind) if kind != wanted => Err(is_other(path, kind, spelling)),
+        _ => Ok(()),
+    }
+}
+
+/// What a settings file describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Sensor,
+    Scene,
+    Study,
+}
+
+/// What the keys at the root are those of, if they are all of one kind.
+fn kind_of(table: &toml::Table) -> Option<Kind> {
+    let is_section = |name: &String| {
+        let value = &table[name];
+        let is_table = value.is_table() || value.is_array();
+        is_table && Scene::SECTIONS.iter().any(|section| section.name == name)
+    };
+    let is_of_study = |name: &String| ["study", "vary", "fixed"].contains(&name.as_str());
+    if table.is_empty() {
+        None
+    } else if table.keys().all(is_section) {
+        Some(Kind::Scene)
+    } else if table.keys().all(is_of_study) {
+        Some(Kind::Study)
+    } else if table.keys().all(|name| SensorConfig::key(name).is_some()) {
+        Some(Kind::Sensor)
+    } else {
+        None
+    }
+}
+
+fn is_other(path: &Path, kind: Kind, spelling: Spelling) -> InputError {
+    let (what, key) = match kind {
+        Kind::Sensor => ("a sensor", "sensor"),
+        Kind::Scene => ("a scene", "scene"),
+        Kind::Study => return InputError::new(path.display(), "is a study; `gdtof sweep` runs it"),
+    };
+    let message = format!("is {what}; give it as {}", spelling.name(key));
+    InputError::new(path.display(), message)
+}
+
 /// A sensor file, or the description of a chip that is known by name. A file of such a name comes first.
-fn described(path: &Path) -> Result<Document, InputError> {
+fn described(path: &Path, spelling: Spelling) -> Result<Document, InputError> {
     if !is_name(path) {
-        return Document::load(path);
+        let document = Document::load(path)?;
+        refuse_other(&document, path, Kind::Sensor, spelling)?;
+        return Ok(document);
+    }
+    if path.to_str().and_then(Scene::built_in_document).is_some() {
+        return Err(is_other(path, Kind::Scene, spelling));
     }
     let chip = path.to_str().and_then(Sensor::named).ok_or_else(|| {
-        let names = CHIPS.map(|(name, _)| name).join(" or ");
-        InputError::new(
-            path.display(),
-            format!("is neither a file nor a chip; give {names}, or a file"),
-        )
+        let instead = instead_of(&path.to_string_lossy(), CHIPS.map(|(name, _)| name));
+        let message = format!("is neither a file nor a chip; {instead}");
+        InputError::new(path.display(), message)
     })?;
     let table = toml::Table::try_from(&*chip).expect("numbers and words");
     Ok(Document::of(path.display(), table))

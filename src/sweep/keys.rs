@@ -6,6 +6,7 @@ use super::Kind;
 use super::cell::Holds;
 use super::theory::Asked;
 use crate::chip::SensorConfig;
+use crate::files::{instead_of, nearest};
 use crate::request::FrameRequest;
 use crate::scene::Scene;
 use crate::settings::{Key, Range, Settings};
@@ -36,7 +37,7 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
     let none = |there_are: String| Err(format!("{name} is not a key of a study; {there_are}"));
     let all = |keys: &[Key]| -> String {
         let names: Vec<String> = keys.iter().map(|k| format!("{group}.{}", k.name)).collect();
-        format!("give {}", names.join(", "))
+        instead_of(name, names.iter().map(String::as_str))
     };
     let among = |keys: &[Key]| keys.iter().find(|key| key.name == rest).copied();
     let (found, defaults) = match (group, rest, kind) {
@@ -46,13 +47,30 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
         ("windows", "", Kind::Frame) => (Some(WINDOWS), Table::new()),
         ("sensor", key, _) => {
             let Some(found) = SensorConfig::key(key) else {
-                return none("`gdtof sensor` lists those of the sensor".into());
+                return none(
+                    match nearest(key, SensorConfig::KEYS.iter().map(|key| key.name)) {
+                        Some(meant) => format!("did you mean `sensor.{meant}`?"),
+                        None => "`gdtof sensor` lists those of the sensor".into(),
+                    },
+                );
             };
             let defaults = Table::try_from(SensorConfig::default()).expect("numbers and words");
             (Some(found), defaults)
         }
         ("scene", path, _) => {
             let Some(found) = Scene::key(path) else {
+                let (section, key) = path.rsplit_once('.').unwrap_or(("", path));
+                let sections = Scene::SECTIONS.iter();
+                let sections = sections
+                    .filter(|s| section.is_empty() || section.split('.').next() == Some(s.name));
+                let known = sections.flat_map(|s| s.keys.iter().map(move |key| (s.name, key.name)));
+                let meant = nearest(key, known.clone().map(|(_, key)| key));
+                if let Some((name, key)) =
+                    meant.and_then(|meant| known.clone().find(|(_, key)| *key == meant))
+                {
+                    let section = if section.is_empty() { name } else { section };
+                    return none(format!("did you mean `scene.{section}.{key}`?"));
+                }
                 return none("`gdtof scene` lists those of the scene, section and key joined by a dot; an object goes by its name, as scene.object.car.reflectivity".into());
             };
             let section = path.split('.').next().unwrap_or_default();

@@ -14,10 +14,8 @@ use super::row::{Key, Row};
 use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};
 use crate::chip::{Sensor, SensorConfig, library_files};
-use crate::files::{InputError, in_plain_words};
-use crate::request::{
-    FrameRequest, Sources, Spelling, eye_safety_of, file_hash, is_bad_input, sentence,
-};
+use crate::files::{InputError, file_hash, in_plain_words};
+use crate::request::{FrameRequest, Sources, Spelling, eye_safety_of, is_bad_input, sentence};
 use crate::scene::{EyeSafety, Scene};
 use crate::system::{Frame, FrameError, NoDepth, Summary, WindowPolicy, take_frame_by};
 
@@ -233,7 +231,7 @@ impl<'a> Subject<'a> {
         let mut hashes = self.hashes.lock().unwrap_or_else(PoisonError::into_inner);
         let hash = hashes
             .entry(path.to_owned())
-            .or_insert_with(|| file_hash(path).unwrap_or_default());
+            .or_insert_with(|| file_hash(path).map_or(String::new(), |(_, hash)| hash));
         hash.clone()
     }
 

@@ -230,7 +230,7 @@ fn what_is_no_pair_is_refused_in_one_sentence() {
     );
     refused(
         &with(6, "unknown.toml"),
-        "unknown.toml:3: unknown field `bias`",
+        "unknown.toml:3: unknown key `bias`",
     );
     refused(
         &[&FRAME[..], &["--truth", "small.npy"]].concat(),

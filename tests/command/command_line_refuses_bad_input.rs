@@ -101,7 +101,7 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
     for (arguments, says) in [
         (
             sensor("unknown.toml"),
-            "unknown.toml:2: unknown field `colour`",
+            "unknown.toml:2: unknown key `colour`",
         ),
         (
             sensor("zero_hz.toml"),
@@ -132,7 +132,7 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
             with(&replay(&[]), "--inits", "none.csv"),
             "none.csv: cannot be read",
         ),
-        (with(&replay(&[]), "--inits", "."), ".: cannot be read"),
+        (with(&replay(&[]), "--inits", "."), ".: is a folder"),
         (
             with(&replay(&[]), "--events", "outside.csv"),
             "outside.csv:2: macropixel (0, 2) is outside",
@@ -198,7 +198,7 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
         ),
         (
             vec!["frame", "--scene", "scene_key.toml"],
-            "scene_key.toml:3: in [light], unknown field `shade`",
+            "scene_key.toml:3: in [light], unknown key `shade`",
         ),
         (
             vec!["frame", "--scene", "scene_empty.toml"],

@@ -15,6 +15,9 @@ mod delay_lines_are_calibrated;
 mod designs_are_proposed;
 mod drives_are_recorded;
 mod engines_are_chosen_from_the_command_line;
+mod every_command;
+#[cfg(unix)]
+mod every_command_leaves_whole_files;
 mod files_of_others_are_kept;
 mod frames_for_other_tools;
 mod golden_vectors_hold;
@@ -25,9 +28,15 @@ mod libraries_in_any_syntax;
 mod libraries_make_the_chip;
 #[cfg(unix)]
 mod long_runs_keep_their_memory;
+mod messages_help;
 mod mismatch_replays;
+#[cfg(unix)]
+mod no_file_blocks_a_command;
 mod one_window_for_all;
 mod probes_keep_their_first_hits;
+#[cfg(unix)]
+mod progress_shows_on_a_terminal;
+mod quiet_runs_say_nothing;
 mod real_histograms_are_ranged;
 #[cfg(unix)]
 mod results_are_one_set;
@@ -43,3 +52,5 @@ mod the_book_runs;
 mod the_command_explains_itself;
 mod the_same_everywhere;
 mod wave_replays_a_cycle;
+#[cfg(unix)]
+mod what_is_too_much_is_refused_first;

@@ -34,8 +34,10 @@ fn built_in_scenes_go_by_name_and_a_file_of_that_name_comes_first() {
     assert!(!printed("empty").contains("[[object]]"));
     assert_eq!(printed("street"), printed("street"));
     let error = refusal(folder.path(), "vann");
+    assert!(error.contains("did you mean `van`?"), "{error}");
+    let error = refusal(folder.path(), "moon");
     assert!(
-        error.contains("street or van or fog or glass or sweep or night or empty"),
+        error.contains("give street, van, fog, glass, sweep, night or empty"),
         "{error}"
     );
     fs::create_dir(folder.path().join("night")).unwrap();

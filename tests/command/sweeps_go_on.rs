@@ -124,7 +124,7 @@ fn a_study_killed_three_times_is_that_of_one_run() {
     assert!(
         String::from_utf8(stderr)
             .unwrap()
-            .contains("1 lines of the journal are damaged")
+            .contains("damaged in the journal: 1 line; ")
     );
     assert!(String::from_utf8(stdout).unwrap().contains("taken"));
     assert_eq!(table(&here.join("whole")), table(&here.join("killed")));
@@ -255,7 +255,7 @@ fn studies_that_cannot_be_are_refused_with_their_lines() {
         ),
         (
             "[vary]\nsensor.clk_hz = {from=1e8, to=2e8, step=3}\n",
-            "unknown field `step`",
+            "unknown key `step`; did you mean `steps`?",
         ),
         (
             "[study]\ndesign=\"sobol\"\n[vary]\nsensor.rows=[1,2]\n",
@@ -281,7 +281,7 @@ fn studies_that_cannot_be_are_refused_with_their_lines() {
         ),
         (
             "[[vary.zip]]\nsensor.rows=[1,2]\nsensor.cols=[1]\n",
-            "sensor.rows has 2 values and sensor.cols has 1 values",
+            "sensor.rows has 2 values and sensor.cols has 1 value",
         ),
         (
             "[varie]\nsensor.rows=[1]\n",

@@ -18,13 +18,91 @@ pub struct InputError {
     pub further: Vec<InputError>,
 }
 
+/// Names up to this many are listed where none is like the given one.
+const MOST_LISTED: usize = 12;
+
+/// How alike names are, by Jaro's measure, of which one is taken for the other: `clkhz` and `clk_hz` 0.94, `radr` and `radar` 0.93, `quantic`
+/// and `quantic4x4` 0.9, `pd` and `pde` 0.89; `colour` and `cols` 0.75.
+const ALIKE: f64 = 0.8;
+
+/// The one of `known` that `given` is most like, if it is like any.
+pub fn nearest<'k>(given: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
+    let given = given.to_lowercase();
+    let with_likeness = |name: &'k str| (strsim::jaro(&given, &name.to_lowercase()), name);
+    let known = known.into_iter().map(with_likeness);
+    let best = known.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.0 > ALIKE).then_some(best.1)
+}
+
+/// What to do about `given`, which is none of the `known` names: to follow a semicolon.
+pub fn instead_of<'k>(given: &str, known: impl IntoIterator<Item = &'k str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    match (nearest(given, known.iter().copied()), known.split_last()) {
+        (Some(name), _) => format!("did you mean `{name}`?"),
+        (None, None) => "leave it out".to_owned(),
+        (None, Some((last, []))) => format!("give {last}"),
+        (None, Some((last, others))) if known.len() <= MOST_LISTED => {
+            format!("give {} or {last}", others.join(", "))
+        }
+        (None, Some(_)) => format!(
+            "it is like none of the {} names that there are",
+            known.len()
+        ),
+    }
+}
+
+/// An error of the system without its number.
+pub fn in_words(error: &io::Error) -> String {
+    let said = error.to_string();
+    match said.rsplit_once(" (os error ") {
+        Some((words, number)) if number.ends_with(')') => words.to_owned(),
+        _ => said,
+    }
+}
+
+/// Most characters of a source before the middle is left out.
+const LONGEST_SOURCE: usize = 160;
+
+/// A path or an option as a sentence has room for it, without the folder in which results are prepared.
+fn shortened(source: &str) -> String {
+    let is_staging = |part: &&str| !part.starts_with(".gdtof-");
+    let parts: Vec<&str> = source.split('/').filter(is_staging).collect();
+    let source = parts.join("/");
+    let characters: Vec<char> = source.chars().collect();
+    if characters.len() <= LONGEST_SOURCE {
+        return source;
+    }
+    let of = |part: &[char]| part.iter().collect::<String>();
+    let (head, tail) = (LONGEST_SOURCE / 4, LONGEST_SOURCE * 3 / 4);
+    format!(
+        "{}…{}",
+        of(&characters[..head]),
+        of(&characters[characters.len() - tail..])
+    )
+}
+
+/// Text in one line: a terminal does nothing but show it.
+struct Escaped<'t>(&'t str);
+
+impl fmt::Display for Escaped<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.chars().try_for_each(|c| {
+            if c.is_control() {
+                write!(f, "{}", c.escape_default())
+            } else {
+                write!(f, "{c}")
+            }
+        })
+    }
+}
+
 impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.source_name)?;
+        write!(f, "{}", Escaped(&self.source_name))?;
         if let Some(line) = self.line {
             write!(f, ":{line}")?;
         }
-        write!(f, ": {}", self.message)?;
+        write!(f, ": {}", Escaped(&self.message))?;
         self.further.iter().try_for_each(|e| write!(f, "\n{e}"))
     }
 }
@@ -33,7 +111,7 @@ impl InputError {
     /// A complaint about `source` as a whole.
     pub fn new(source: impl fmt::Display, message: impl Into<String>) -> Self {
         InputError {
-            source_name: source.to_string(),
+            source_name: shortened(&source.to_string()),
             line: None,
             message: message.into(),
             further: Vec::new(),
@@ -66,7 +144,10 @@ impl InputError {
     pub fn unreadable(path: &Path, error: &io::Error) -> Self {
         Self::new(
             path.display(),
-            format!("cannot be read ({error}); check the path and its permissions"),
+            format!(
+                "cannot be read ({}); check the path and its permissions",
+                in_words(error)
+            ),
         )
     }
 
@@ -78,7 +159,67 @@ impl InputError {
         };
         Self::new(
             path.display(),
-            format!("cannot be written ({error}); {cure}"),
+            format!("cannot be written ({}); {cure}", in_words(error)),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_that_with_a_slip() {
+        let keys = [
+            "rows",
+            "cols",
+            "clk_hz",
+            "load_clk_hz",
+            "pde",
+            "radar",
+            "quantic4x4",
+        ];
+        for (given, meant) in [
+            ("clkhz", Some("clk_hz")),
+            ("Clk_Hz", Some("clk_hz")),
+            ("row", Some("rows")),
+            ("pd", Some("pde")),
+            ("radr", Some("radar")),
+            ("quantic", Some("quantic4x4")),
+            ("colour", None),
+            ("", None),
+        ] {
+            assert_eq!(nearest(given, keys), meant, "{given}");
+        }
+        assert_eq!(instead_of("x", []), "leave it out");
+        assert_eq!(instead_of("x", ["a"]), "give a");
+        assert_eq!(instead_of("x", ["a", "b", "c"]), "give a, b or c");
+        assert_eq!(instead_of("clkhz", keys), "did you mean `clk_hz`?");
+        let many: Vec<String> = (0..45).map(|n| format!("k{n}")).collect();
+        let many = instead_of("zzz", many.iter().map(String::as_str));
+        assert_eq!(many, "it is like none of the 45 names that there are");
+    }
+
+    #[test]
+    fn a_complaint_is_one_short_line() {
+        let said = |path: &str| InputError::new(path, "a\nb").to_string();
+        assert_eq!(said("x\ny\u{1b}[2J"), "x\\ny\\u{1b}[2J: a\\nb");
+        assert_eq!(
+            said("out/.gdtof-0123-4567/frame.json"),
+            "out/frame.json: a\\nb"
+        );
+        let long = said(&("d/".repeat(1000) + "end.toml"));
+        assert!(long.chars().count() < 180 && long.contains("…"), "{long}");
+        assert!(long.contains("/end.toml"), "{long}");
+    }
+
+    #[test]
+    fn errors_of_the_system_have_no_number() {
+        let missing = io::Error::from_raw_os_error(2);
+        let said = InputError::unreadable(Path::new("x"), &missing).to_string();
+        assert!(
+            said.starts_with("x: cannot be read (") && !said.contains("os error"),
+            "{said}"
+        );
     }
 }

@@ -9,5 +9,5 @@ mod origin;
 pub mod units;
 pub mod waves;
 
-pub use complaint::InputError;
+pub use complaint::{InputError, in_words, instead_of, nearest};
 pub use origin::Origin;

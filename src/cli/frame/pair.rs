@@ -16,10 +16,11 @@ use serde::Serialize;
 
 use crate::chip::SensorConfig;
 use crate::cli::stereo::{Errors, TruthArgs, cannot_match, disparity_picture, read_image};
-use crate::files::{InputError, Raster, parse_toml, read_text};
+use crate::files::{InputError, Raster, parse_toml};
 use crate::guide::{Guide, GuideInput, MatchedPair};
 use crate::report::{Table, write_npy_f32};
 use crate::scene::{DVec3, DepthMap, GroundTruth, MapFiles, Object, PinholeCamera, Scene, Shape};
+use crate::settings::Document;
 use crate::stereo::{DisparityMap, Matcher};
 
 /// Standard deviation that is claimed for a disparity, px: half of all errors on the Motorcycle pair are below 0.15 px, as with 0.22 px, and tails are
@@ -32,7 +33,7 @@ const DEPTH_FILE: &str = "depth_map.npy";
 #[derive(Args)]
 pub(super) struct PairArgs {
     /// Left picture (PNG) of a real, rectified camera pair to use in place of a scene; needs --right and --calib.
-    #[arg(long, value_name = "FILE", requires_all = ["right", "calib"], conflicts_with = "scene")]
+    #[arg(long, value_name = "FILE", requires_all = ["right", "calib"], conflicts_with_all = ["scene", "world"])]
     left: Option<PathBuf>,
     /// Right picture of that pair (PNG).
     #[arg(long, value_name = "FILE", requires = "left")]
@@ -241,7 +242,7 @@ pub(in crate::cli) fn read_calibration(
     path: &Path,
 ) -> Result<(Calibration, [Intrinsics; 2]), InputError> {
     let complain = |message: String| InputError::new(path.display(), message);
-    let calibration: Calibration = parse_toml(path.display(), &read_text(path)?)?;
+    let calibration: Calibration = parse_toml(path.display(), &Document::text(path)?)?;
     let own = intrinsics("left", calibration.left).map_err(complain)?;
     let other = match calibration.right {
         Some(right) => intrinsics("right", right).map_err(complain)?,

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::args::RangeArgs;
 use crate::cli::quality;
-use crate::cli::voice::{say, say_json, tell};
-use crate::files::{OutputFile, read_counts};
+use crate::cli::voice::{say_json, tell};
+use crate::files::{InputError, OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate, read_calibration};
@@ -27,7 +27,12 @@ struct Report<'a> {
 /// Bad input, files that cannot be written.
 pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     let beside = args.histograms.with_file_name("frame.json");
-    let taken = TakenFrame::read(args.frame.as_deref().unwrap_or(&beside))?;
+    let file = args.frame.as_deref().unwrap_or(&beside);
+    if !file.exists() {
+        let message = "does not exist; give the frame.json that belongs to the counts with --frame";
+        return Err(InputError::new(file.display(), message).into());
+    }
+    let taken = TakenFrame::read(file)?;
     let sensor = &taken.settings.sensor;
     let default = DepthOptions::default();
     let rate = args.false_alarm_rate.unwrap_or(default.false_alarm_rate);
@@ -59,11 +64,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     }
     let mut table = Table::new(format!("Depths of {}", args.histograms.display()));
     quality::rows(&mut table, &options, &ranged.summary());
-    match &args.out {
-        Some(_) => tell(table)?,
-        None => say(table)?,
-    }
-    Ok(())
+    Ok(tell(table)?)
 }
 
 /// Columns of the returns after the first.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::args::{Fit, RangeArgs};
-use crate::cli::voice::{say, say_json};
+use crate::cli::voice::{say_json, tell};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
@@ -258,7 +258,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     if args.json {
         return say_json(&report);
     }
-    say(table(&report))?;
+    tell(table(&report))?;
     Ok(())
 }
 

@@ -6,6 +6,7 @@ use clap::Args;
 
 use crate::chip::{Exposure, Sensor};
 use crate::cli::SensorArgs;
+use crate::cli::voice::note;
 use crate::files::InputError;
 use crate::photon::SpadEvent;
 use crate::request::{self, Spelling};
@@ -78,10 +79,10 @@ impl Stimuli {
             ),
         ];
         for (count, what) in dropped.into_iter().filter(|(count, _)| *count > 0) {
-            eprintln!(
-                "gdtof: {count} of {} events {what} and were not used",
+            note(format_args!(
+                "{count} of {} events {what} and were not used",
                 recording.read
-            );
+            ));
         }
         Ok(Stimuli {
             sensor,

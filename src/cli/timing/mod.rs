@@ -14,7 +14,7 @@ use self::section::{Cell, Section};
 use self::tables::Subject;
 use super::SensorArgs;
 use super::settings::SiliconArgs;
-use super::voice::say;
+use super::voice::{busy, say_json, tell};
 use crate::analysis::{LoadTiming, ReadTiming, TimingVerdict};
 use crate::chip::{Limits, SensorConfig, Silicon, Tdc};
 use crate::files::InputError;
@@ -66,6 +66,7 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
             "without mismatch all macropixels are equal; add --mismatch 0.05, for example";
         return Err(InputError::new(format!("--plot {}", plot.display()), message).into());
     }
+    let busy = busy("analysing");
     let subject = Subject::new(&config, &silicon);
     let load = LoadTiming::of(&config, &silicon, Limits::Kept);
     let read = ReadTiming::of(&config, &silicon, Limits::Kept);
@@ -102,17 +103,17 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     if args.explain {
         sections.extend(explain::cells(&silicon)?);
     }
+    drop(busy);
     if args.json {
         let mut document = serde_json::Map::new();
         document.insert("timing".to_owned(), serde_json::to_value(verdict.report())?);
         for section in &sections {
             section.add_to(&mut document);
         }
-        let document = serde_json::Value::Object(document);
-        say(format_args!("{document:#}\n"))?;
+        say_json(&document)?;
     } else {
         for section in &sections {
-            say(section.text())?;
+            tell(section.text())?;
         }
     }
     Ok(())

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{Kind, MOST_POINTS, Study};
-use crate::files::{InputError, Misfit};
+use crate::files::{InputError, Misfit, in_plain_words, instead_of};
 use crate::settings::Range::Within;
 use crate::settings::{Document, Fault, Section, Settings, keys, schema, words};
 use crate::sweep::cell::{Column, Holds};
@@ -122,7 +122,7 @@ impl Study {
         folder: &Path,
         name: &str,
     ) -> Result<Self, InputError> {
-        let document = Document::parse(&source, text)?;
+        let document = Document::parse(&source, &with_files_beside_keys(text))?;
         let mut faults = Vec::new();
         let mut fault = |path: &str, message: String| {
             let path = path.to_owned();
@@ -140,7 +140,10 @@ impl Study {
             if !["study", "fixed", "vary"].contains(&name.as_str()) {
                 fault(
                     name,
-                    format!("{name}: unknown section; give [study], [vary] or [fixed]"),
+                    format!(
+                        "{name}: unknown section; {}",
+                        instead_of(name, ["study", "vary", "fixed"])
+                    ),
                 );
             }
         }
@@ -158,6 +161,7 @@ impl Study {
         let mut assignments = Vec::new();
         flatten("", fixed, &mut |name, value| {
             let path = format!("fixed.{name}");
+            let name = name.trim_end_matches('.');
             match names::find(head.kind, name).and_then(|known| names::checked(&known, value)) {
                 Ok(value) => assignments.push((name.to_owned(), value)),
                 Err(message) => fault(&path, message),
@@ -279,6 +283,7 @@ fn zipped_axes(
         };
         if let Some(other) = members.iter().find(|other| other.len() != first.len()) {
             let count = |varied: &Varied| match varied.len() {
+                Some(1) => format!("{} has 1 value", varied.name),
                 Some(n) => format!("{} has {n} values", varied.name),
                 None => format!("{} has no steps", varied.name),
             };
@@ -389,8 +394,28 @@ fn flatten(prefix: &str, table: &Table, found: &mut dyn FnMut(&str, &Value)) {
     }
 }
 
+/// `sensor = "a.toml"` stands beside `sensor.rows = 16` in no TOML: the file goes by the key that is empty, `sensor."" = "a.toml"`.
+fn with_files_beside_keys(text: &str) -> String {
+    let line = |line: &str| {
+        let indent = line.len() - line.trim_start().len();
+        let (before, rest) = line.split_at(indent);
+        let name = ["sensor", "scene"].into_iter().find(|name| {
+            let value = rest
+                .strip_prefix(name)
+                .and_then(|rest| rest.trim_start().strip_prefix('='));
+            value.is_some_and(|value| value.trim_start().starts_with(['"', '\'', '[']))
+        });
+        match name {
+            Some(name) => format!("{before}{name}.\"\"{}", &rest[name.len()..]),
+            None => line.to_owned(),
+        }
+    };
+    text.split_inclusive('\n').map(line).collect()
+}
+
 /// What `[vary]` says of a key.
 fn varied(kind: Kind, name: &str, value: &Value) -> Result<Varied, String> {
+    let name = name.trim_end_matches('.');
     let known = names::find(kind, name)?;
     let values = match value {
         Value::Array(list) if list.is_empty() => {
@@ -431,10 +456,13 @@ fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
         scale,
     } = range.clone().try_into().map_err(|e: toml::de::Error| {
         let said = e.message().trim();
-        let what = Misfit::of(said).map_or(said.into(), |misfit| misfit.without_cure());
-        format!(
-            "{name}: {what}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}"
-        )
+        match Misfit::of(said) {
+            Some(misfit) => format!(
+                "{name}: {}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}",
+                misfit.without_cure()
+            ),
+            None => format!("{name}: {}", in_plain_words(said)),
+        }
     })?;
     let ends = [from, to].map(|end| -> Result<f64, String> {
         let end = names::checked(known, &end)?;

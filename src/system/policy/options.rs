@@ -4,7 +4,7 @@ use toml::Table;
 
 use super::WindowPolicy;
 use crate::files::InputError;
-use crate::settings::Document;
+use crate::settings::{Document, Key, Range, Settings};
 
 impl WindowPolicy {
     /// This policy with what `text` changes in it; `source` is what complaints call the place where it stands.
@@ -15,6 +15,15 @@ impl WindowPolicy {
         let option = format!("{source} {text}");
         let mut document = Document::of(&option, Table::new());
         for assignment in text.split(',').filter(|part| !part.trim().is_empty()) {
+            let is_its = |key: &&Key| matches!(key.range, Range::OneOf(words) if words.contains(&assignment.trim()));
+            if let Some(key) = Self::KEYS.iter().find(is_its) {
+                let message = format!(
+                    "names no key; did you mean {}={}?",
+                    key.name,
+                    assignment.trim()
+                );
+                return Err(InputError::new(option, message));
+            }
             document.assign(assignment, &option)?;
         }
         let mut faults = Vec::new();
@@ -30,7 +39,6 @@ impl WindowPolicy {
 mod tests {
     use super::super::Unguided;
     use super::*;
-    use crate::settings::Settings;
 
     #[test]
     fn what_is_not_said_stays() {
@@ -62,11 +70,13 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said_in_one_sentence() {
         for (text, says) in [
-            ("unguided=wander", "unknown variant `wander`"),
+            ("unguided=wander", "`wander` is impossible; give off"),
+            ("unguided=neighbor", "did you mean `neighbour`?"),
+            ("neighbour", "did you mean unguided=neighbour?"),
             ("overlap=1", "overlap = 1 is impossible; give 0 to 0.9"),
             ("patience=-1", "patience"),
             ("steps_in_doubt", "has no value; give key=value"),
-            ("wide=true", "unknown field `wide`"),
+            ("wide=true", "unknown key `wide`"),
         ] {
             let error = WindowPolicy::default().with(text, "windows").unwrap_err();
             assert!(error.to_string().contains(says), "{error}");

@@ -105,11 +105,11 @@ fn netlists_are_refused_with_file_and_cure() {
     for (block, says) in [
         (
             "tdc=lfsr.json",
-            "--block tdc=lfsr.json: is no block; give p_counter=FILE or correlation=FILE or front_end=FILE or metdc=FILE or histogram=FILE",
+            "--block tdc=lfsr.json: is no BLOCK=FILE with a block; give p_counter, correlation, front_end, metdc or histogram",
         ),
         (
             "lfsr.json",
-            "--block lfsr.json: is no block; give p_counter=FILE or correlation=FILE or ",
+            "--block lfsr.json: is no BLOCK=FILE with a block; give p_counter",
         ),
         (
             "p_counter=gone.json",

@@ -37,7 +37,7 @@ fn chips_are_known_by_name_and_files_come_first() {
     refused(
         dir,
         &["sensor", "--sensor", "hsl"],
-        "hsl: is neither a file nor a chip; give quantic4x4 or hslidar",
+        "hsl: is neither a file nor a chip; did you mean `hslidar`?",
     );
     std::fs::write(dir.join("hslidar"), "bins = 5\n").unwrap();
     assert_eq!(printed(&["sensor", "--sensor", "hslidar"]).bins, 5);
@@ -115,7 +115,7 @@ fn set_changes_single_keys_and_names_itself_in_complaints() {
         ),
         (
             timing("sensor.clk=8"),
-            "--set sensor.clk=8: unknown field `clk`",
+            "--set sensor.clk=8: unknown key `clk`",
         ),
         (
             timing("sensor.threshold=16"),

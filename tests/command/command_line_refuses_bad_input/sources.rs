@@ -46,12 +46,12 @@ fn input_that_is_no_text_or_never_ends_is_refused_early() {
     huge.set_len(1 << 40).unwrap();
     std::fs::write(dir.join("utf16"), [0xff, 0xfe, b'r', 0]).unwrap();
     let sources = [
-        ("/dev/zero", "/dev/zero"),
-        ("/dev/urandom", "/dev/urandom"),
+        ("/dev/zero", "/dev/zero: is a device"),
+        ("/dev/urandom", "/dev/urandom: is a device"),
         ("pipe", "pipe: is a named pipe"),
         ("huge", "huge"),
         ("utf16", "UTF-16; save it as UTF-8"),
-        (".", ".: cannot be read"),
+        (".", ".: is a folder"),
     ];
     for (source, says) in sources {
         let gate = replay(&["--engine", "gate", "--sdf", source]);

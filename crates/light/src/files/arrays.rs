@@ -64,7 +64,7 @@ fn open(
     shape: &[usize],
     axes: &str,
 ) -> Result<(NpyHead, BufReader<File>), InputError> {
-    let file = open_input(path).map_err(|e| InputError::unreadable(path, &e))?;
+    let file = open_input(path)?;
     let mut reader = BufReader::new(file);
     let head = NpyHead::read(&mut reader).map_err(|e| broken(path, &e))?;
     if head.shape == shape && !head.is_fortran {

@@ -1,5 +1,7 @@
 //! What a run of the command may not lose: the files that it reads, and files that are not its own where it writes.
 //!
+//! [`open_file`] is the only place where files are opened to be read; clippy refuses others. It takes nothing that need not end.
+//!
 //! From [`guard_inputs`] on, every file that is opened by [`open_input`] is known by its device and inode (elsewhere than on Unix by
 //! its path without links). Whatever replaces files, [`super::OutputFile`] and [`super::ResultSet`], asks [`refuse_input`] first.
 //!
@@ -51,12 +53,52 @@ pub fn said_of_kept_files() -> Vec<String> {
     sentences.unwrap_or_default()
 }
 
+/// Opens a file to be read. A pipe without a place in the file system, as of `<(...)` or of standard input, is one: its other
+/// end is held by a process that the user has just started.
+///
+/// # Errors
+/// A named pipe, a device, a folder, and what cannot be opened.
+pub fn open_file(path: &Path) -> Result<File, InputError> {
+    let unreadable = |e| InputError::unreadable(path, &e);
+    let kind = fs::metadata(path).map_err(unreadable)?.file_type();
+    let complain = |message: String| Err(InputError::new(path.display(), message));
+    if kind.is_dir() {
+        return complain("is a folder; give a file".into());
+    }
+    if let Some(what) = endless(path, kind) {
+        let cure = "which may never end; write its contents to a file first";
+        return complain(format!("is {what}, {cure}"));
+    }
+    #[expect(clippy::disallowed_methods, reason = "this is the one place")]
+    File::open(path).map_err(unreadable)
+}
+
+/// What something is whose end nobody knows.
+#[cfg(unix)]
+fn endless(path: &Path, kind: fs::FileType) -> Option<&'static str> {
+    use std::os::unix::fs::FileTypeExt;
+    if kind.is_fifo() && path.canonicalize().is_ok() {
+        Some("a named pipe")
+    } else if kind.is_char_device() || kind.is_block_device() {
+        Some("a device")
+    } else if kind.is_socket() {
+        Some("a socket")
+    } else {
+        None
+    }
+}
+
+#[cfg(not(unix))]
+fn endless(_: &Path, _: fs::FileType) -> Option<&'static str> {
+    None
+}
+
 /// Opens a file that the user gives to be read.
 ///
 /// # Errors
-/// When it cannot be opened.
-pub fn open_input(path: &Path) -> io::Result<File> {
-    let file = File::open(path)?;
+/// As [`open_file`].
+pub fn open_input(path: &Path) -> Result<File, InputError> {
+    let file = open_file(path)?;
     if let (Some(guarded), Some(id)) = (guarded().as_mut(), id_of(path)) {
         guarded.inputs.entry(id).or_insert_with(|| path.to_owned());
     }
@@ -84,6 +126,24 @@ pub fn refuse_input(path: &Path) -> Result<(), InputError> {
         )
     };
     Err(InputError::new(path.display(), message))
+}
+
+/// What stands in the way of a file.
+const FOLDER_THERE: &str = "is a folder; give the name of a file";
+
+/// Complains if what stands at `path` is no file.
+///
+/// # Errors
+/// A folder, a pipe or a device.
+pub(super) fn refuse_special(path: &Path) -> Result<(), InputError> {
+    let complain = |message: &str| Err(InputError::new(path.display(), message));
+    match fs::metadata(path) {
+        Ok(about) if about.is_dir() => complain(FOLDER_THERE),
+        Ok(about) if !about.is_file() => {
+            complain("is a pipe or a device, which would be replaced; give the name of a file")
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Complains if a single file at `path` would replace one that this run has read, or one of a set of results.
@@ -126,9 +186,9 @@ pub fn set_aside_foreign(
         return Ok(());
     };
     if about.is_dir() {
-        return Err(unwritable(io::Error::other("it is a folder")));
+        return Err(InputError::new(path.display(), FOLDER_THERE));
     }
-    if about.is_file() && is_ours(BufReader::new(File::open(path).map_err(unwritable)?)) {
+    if about.is_file() && is_ours(BufReader::new(open_file(path)?)) {
         return Ok(());
     }
     refuse_to_replace(path)?;
@@ -216,5 +276,32 @@ mod tests {
             fs::read_link(dir.path().join("x.kept.log")).unwrap(),
             target
         );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_may_never_end_is_not_opened() {
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        let made = std::process::Command::new("mkfifo")
+            .arg(at("pipe"))
+            .status();
+        assert!(made.unwrap().success());
+        symlink(at("pipe"), at("link")).unwrap();
+        symlink("/dev/zero", at("zero")).unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        for (name, says) in [
+            ("pipe", "is a named pipe"),
+            ("link", "is a named pipe"),
+            ("zero", "is a device"),
+            ("socket", "is a socket"),
+            ("", "is a folder"),
+        ] {
+            let refused = open_file(&at(name)).unwrap_err().to_string();
+            assert!(refused.contains(says), "{refused}");
+        }
+        fs::write(at("file"), "").unwrap();
+        assert!(open_file(&at("file")).is_ok());
     }
 }

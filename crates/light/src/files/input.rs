@@ -1,7 +1,7 @@
 //! Texts that users give: read whole, or line by line where they may be long.
 //!
 //! UTF-8, with or without a byte order mark. What is no text, or shows no end, is refused by the time a megabyte of it
-//! has been read: a byte that no text has, a line of more than a mebibyte, and, of pipes and devices, which need not
+//! has been read: a byte that no text has, a line of more than a mebibyte, and, of pipes, which need not
 //! end, more than a mebibyte that must be read whole or that has nothing to use in it. Long tables have no limit: they
 //! are read line by line and never held in memory.
 
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 
 use super::guarded::open_input;
-use super::misfit::{Misfit, in_plain_words};
+use super::misfit::{Misfit, in_plain_words, without_place, wrong_name};
 use femtogate::InputError;
 
 /// Longest line of a table, and most that is read of an input that need not end before it has shown its use, bytes.
@@ -25,27 +25,10 @@ pub(crate) const MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// An opened file, and whether its end is known.
 fn open(path: &Path) -> Result<(File, bool), InputError> {
-    let unreadable = |e| InputError::unreadable(path, &e);
-    let kind = std::fs::metadata(path).map_err(unreadable)?.file_type();
-    if is_named_pipe(path, kind) {
-        let message = "is a named pipe, which may never end; write its contents to a file first";
-        return Err(InputError::new(path.display(), message));
-    }
-    let file = open_input(path).map_err(unreadable)?;
-    Ok((file, kind.is_file()))
-}
-
-/// A pipe without a place in the file system, as of `<(...)` or of standard input, is not one: its other end is held by
-/// a process that the user has just started.
-#[cfg(unix)]
-fn is_named_pipe(path: &Path, kind: std::fs::FileType) -> bool {
-    use std::os::unix::fs::FileTypeExt;
-    kind.is_fifo() && path.canonicalize().is_ok()
-}
-
-#[cfg(not(unix))]
-fn is_named_pipe(_: &Path, _: std::fs::FileType) -> bool {
-    false
+    let file = open_input(path)?;
+    let about = file.metadata();
+    let about = about.map_err(|e| InputError::unreadable(path, &e))?;
+    Ok((file, about.is_file()))
 }
 
 /// What is wrong with `bytes` as text, apart from a character that they end within.
@@ -73,7 +56,7 @@ pub fn placed(folder: &Path, file: &Path) -> PathBuf {
 /// Reads a text file as a whole.
 ///
 /// # Errors
-/// When it cannot be read, is no UTF-8 text, or is a pipe or device with more than a mebibyte.
+/// When it cannot be read, is no UTF-8 text, or is a pipe with more than a mebibyte.
 pub fn read_text(path: &Path) -> Result<String, InputError> {
     read_text_within(path, usize::MAX)
 }
@@ -220,14 +203,30 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
+/// Most lines and commas of TOML, and most bytes of a file: 16 MiB of `[0,1],` take 4 s and 2 GB to parse, five times the entries.
+const MOST_ENTRIES: usize = 1 << 20;
+/// See [`MOST_ENTRIES`].
+pub(crate) const MOST_TOML_BYTES: usize = 16 << 20;
+
 /// Parses TOML text; `source` names it in complaints.
 ///
 /// # Errors
-/// Syntax errors, unknown keys and wrong types, with their line.
+/// Syntax errors, unknown keys and wrong types, with their line; a text that is too long.
 pub fn parse_toml<T: DeserializeOwned>(
     source: impl fmt::Display,
     text: &str,
 ) -> Result<T, InputError> {
+    if text.len() > MOST_TOML_BYTES {
+        return Err(too_long(source, MOST_TOML_BYTES));
+    }
+    let entries = text.bytes().filter(|byte| matches!(byte, b',' | b'\n'));
+    let entries = entries.count();
+    if entries > MOST_ENTRIES {
+        let message = format!(
+            "has {entries} lines and commas, of which at most {MOST_ENTRIES} are read of settings; give fewer values"
+        );
+        return Err(InputError::new(source, message));
+    }
     toml::from_str(text).map_err(|e| {
         let message = in_plain_words(e.message());
         match e.span() {
@@ -251,7 +250,12 @@ pub fn parse_json<T: DeserializeOwned>(
 ) -> Result<T, InputError> {
     serde_json::from_str(text).map_err(|e| {
         let said = e.to_string();
-        let what = Misfit::of(&said).map_or(said, |misfit| misfit.without_cure());
+        let what = match Misfit::of(&said) {
+            Some(misfit) => misfit.without_cure(),
+            None if e.is_data() => wrong_name(without_place(&said)).unwrap_or(said),
+            None if e.is_eof() => "the text ends early".to_owned(),
+            None => "this is no JSON".to_owned(),
+        };
         InputError::at(source, e.line(), format!("{what}; give {wanted}"))
     })
 }
@@ -288,8 +292,7 @@ mod tests {
         let e = parse_toml::<Sample>("a.toml", "rows = 3\n\ncolour = 1\n").unwrap_err();
         assert_eq!(e.line, Some(3));
         assert!(
-            e.to_string()
-                .starts_with("a.toml:3: unknown field `colour`"),
+            e.to_string().starts_with("a.toml:3: unknown key `colour`"),
             "{e}"
         );
     }

@@ -5,6 +5,9 @@
 //! next run removes (see `temporary`).
 
 use std::io;
+use std::path::Path;
+
+use super::input::read_text;
 
 /// From now on, signals that ask this process to end remove its unfinished files and end it. For `main` alone: a
 /// library has no say in what signals do.
@@ -60,7 +63,7 @@ fn end(signal: i32) -> ! {
 /// Whether the process was started with this signal ignored. Linux tells; elsewhere it counts as ignored.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let status = read_text(Path::new("/proc/self/status")).unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
     mask.is_none_or(|mask| mask >> (signal - 1) & 1 == 1)

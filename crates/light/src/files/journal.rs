@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use super::guarded::open_file;
 use super::temporary::lock;
 use femtogate::InputError;
 
@@ -159,7 +160,7 @@ impl JournalReader {
     /// # Errors
     /// When it cannot be read.
     pub fn open(path: &Path) -> Result<Self, InputError> {
-        let file = File::open(path).map_err(|e| InputError::unreadable(path, &e))?;
+        let file = open_file(path)?;
         Ok(JournalReader {
             path: path.to_owned(),
             reader: BufReader::with_capacity(1 << 16, file),

@@ -6,6 +6,8 @@
 
 use std::fmt;
 
+use femtogate::instead_of;
+
 /// What stands there and what belongs there. As text it is a sentence with its cure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Misfit {
@@ -34,8 +36,30 @@ pub fn in_plain_words(said: &str) -> String {
     match Misfit::of(&said) {
         Some(misfit) => misfit.to_string(),
         None if is_no_word(&said) => "a word belongs here; correct this entry".into(),
-        None => format!("{said}; correct this entry"),
+        None => wrong_name(&said).unwrap_or_else(|| format!("{said}; correct this entry")),
     }
+}
+
+/// What a reader says of a name that is none or is missing, with a cure.
+pub(crate) fn wrong_name(said: &str) -> Option<String> {
+    let after = |beginning: &str| said.strip_prefix(beginning)?.split_once('`');
+    // Names that are possible stand between backquotes, too.
+    let known = |rest: &str| -> Vec<String> {
+        rest.split('`')
+            .skip(1)
+            .step_by(2)
+            .map(str::to_owned)
+            .collect()
+    };
+    let instead = |given: &str, rest: &str| instead_of(given, known(rest).iter().map(|k| &**k));
+    if let Some((name, rest)) = after("unknown field `") {
+        return Some(format!("unknown key `{name}`; {}", instead(name, rest)));
+    }
+    if let Some((name, rest)) = after("unknown variant `") {
+        return Some(format!("`{name}` is impossible; {}", instead(name, rest)));
+    }
+    let (name, _) = after("missing field `")?;
+    Some(format!("the key `{name}` is missing; add it"))
 }
 
 /// Whether a reader says that something else stands where one of some words belongs.
@@ -95,7 +119,7 @@ const WHOLE: &str = "a whole number";
 const NUMBER: &str = "a number";
 
 /// Without the place that JSON's reader adds.
-fn without_place(said: &str) -> &str {
+pub(crate) fn without_place(said: &str) -> &str {
     let is_number = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
     let place = said.rsplit_once(" at line ").and_then(|(before, place)| {
         let (line, column) = place.split_once(" column ")?;
@@ -112,11 +136,14 @@ fn as_written(found: &str) -> String {
         "null" | "unit value" | "Option value" => "nothing",
         _ => match (found.strip_prefix("string "), found.split_once('`')) {
             (Some(text), _) => text,
-            (None, Some((_, value))) => value.trim_end_matches('`'),
+            (None, Some((_, value))) => value.rsplit_once('`').map_or(value, |(value, _)| value),
             (None, None) => found,
         },
     };
-    bare.to_owned()
+    match bare.parse::<f64>() {
+        Ok(number) if bare.len() > 17 => format!("{number:e}"),
+        _ => bare.to_owned(),
+    }
 }
 
 /// What belongs where a type is expected, and what the type alone allows of it.
@@ -258,7 +285,7 @@ mod tests {
             ),
             (
                 toml::<Word>("\"two\""),
-                "unknown variant `two`, expected `one`; correct this entry".into(),
+                "`two` is impossible; give one".into(),
             ),
         ] {
             assert_eq!(said, says);

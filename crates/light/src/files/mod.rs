@@ -27,13 +27,14 @@ mod result_set;
 mod temporary;
 
 pub use arrays::{read_array, read_counts};
-pub use femtogate::InputError;
+pub use femtogate::{InputError, in_words, instead_of, nearest};
 pub use guarded::{
-    begins_with, guard_inputs, open_input, refuse_input, said_of_kept_files, set_aside_foreign,
+    begins_with, guard_inputs, open_file, open_input, refuse_input, said_of_kept_files,
+    set_aside_foreign,
 };
 pub use input::Lines;
-pub(crate) use input::MARK;
 pub use input::{LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, too_long};
+pub(crate) use input::{MARK, MOST_TOML_BYTES};
 pub use interruption::clean_up_when_interrupted;
 pub use journal::{Journal, JournalReader, is_journal, journal_line};
 pub use misfit::Misfit;
@@ -42,4 +43,4 @@ pub(crate) use misfit::is_no_word;
 pub use npy::{Element, NpyHead, Number, write_npy, write_npy_elements, write_npy_head};
 pub use output::{OutputFile, create_folder};
 pub use raster::Raster;
-pub use result_set::{MANIFEST, ManifestFile, ResultSet};
+pub use result_set::{MANIFEST, ManifestFile, ResultSet, file_hash};

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::guarded::{refuse_input, refuse_to_replace};
+use super::guarded::{refuse_input, refuse_special, refuse_to_replace};
 use super::temporary::Temporary;
 use femtogate::InputError;
 
@@ -23,13 +23,11 @@ impl OutputFile {
     /// set of results.
     pub fn create(path: &Path) -> Result<Self, InputError> {
         let unwritable = |e: io::Error| InputError::unwritable(path, &e);
-        if path.is_dir() {
-            return Err(unwritable(io::Error::other("it is a folder")));
-        }
         let folder = match path.parent() {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
         };
+        refuse_special(path)?;
         refuse_to_replace(path)?;
         let (temporary, file) = Temporary::file_in(folder).map_err(unwritable)?;
         Ok(OutputFile {

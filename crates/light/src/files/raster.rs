@@ -75,13 +75,15 @@ impl Raster {
     fn read_any(path: &Path) -> Result<(Self, bool), InputError> {
         let complain = |message: String| InputError::new(path.display(), message);
         let unreadable = |e| InputError::unreadable(path, &e);
-        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+        let file = open_input(path)?;
+        let about = file.metadata().map_err(unreadable)?;
+        // Each kind is known by its length, which a pipe does not tell.
+        if !about.is_file() {
             return Err(complain(
-                "is not a file; give a PNG, .npy, PFM or EXR".into(),
+                "is a pipe; write its contents to a file first".into(),
             ));
         }
-        let file = open_input(path).map_err(unreadable)?;
-        let length = file.metadata().map_err(unreadable)?.len();
+        let length = about.len();
         let mut reader = BufReader::new(file);
         let first = reader.fill_buf().map_err(unreadable)?;
         let read = match first {

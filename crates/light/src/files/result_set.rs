@@ -15,16 +15,16 @@
 //! lists both sets, so that a run killed in it neither passes for whole nor loses track of its files.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::fs;
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::guarded::{free_name, refuse_input, set_aside_sentence};
+use super::guarded::{free_name, open_file, refuse_input, set_aside_sentence};
 use super::output::create_folder;
-use super::temporary::{Registry, Temporary, lock};
+use super::temporary::{Registry, Temporary, lock, open_folder};
 use femtogate::InputError;
 
 /// Name of the manifest.
@@ -36,6 +36,7 @@ pub struct ResultSet {
     folder: PathBuf,
     command: String,
     staging: Temporary,
+    keeps_others: bool,
     /// Dropped after what is staged in it.
     _made: Option<MadeFolder>,
 }
@@ -62,22 +63,31 @@ pub struct ManifestFile {
     pub sha256: String,
 }
 
-impl ManifestFile {
-    fn of(folder: &Path, name: &str) -> io::Result<Self> {
-        let mut file = File::open(folder.join(name))?;
-        let mut hash = Sha256::new();
-        let mut bytes = 0;
-        let mut chunk = vec![0; 1 << 18];
-        loop {
-            match file.read(&mut chunk)? {
-                0 => break,
-                n => {
-                    hash.update(&chunk[..n]);
-                    bytes += n as u64;
-                }
+/// Bytes of a file, and their hash, SHA-256 in hexadecimal digits.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn file_hash(path: &Path) -> io::Result<(u64, String)> {
+    let mut file = open_file(path).map_err(io::Error::other)?;
+    let mut hash = Sha256::new();
+    let mut bytes = 0;
+    let mut chunk = vec![0; 1 << 18];
+    loop {
+        match file.read(&mut chunk)? {
+            0 => break,
+            n => {
+                hash.update(&chunk[..n]);
+                bytes += n as u64;
             }
         }
-        let sha256 = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    }
+    let digits = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    Ok((bytes, digits))
+}
+
+impl ManifestFile {
+    fn of(folder: &Path, name: &str) -> io::Result<Self> {
+        let (bytes, sha256) = file_hash(&folder.join(name))?;
         Ok(ManifestFile {
             name: name.to_owned(),
             bytes,
@@ -105,12 +115,11 @@ impl Manifest {
     /// The manifest of a folder, if it has one that is ours.
     fn read(folder: &Path) -> Option<Self> {
         let path = folder.join(MANIFEST);
-        // A pipe would not end.
         if !fs::symlink_metadata(&path).ok()?.is_file() {
             return None;
         }
-        let text = fs::read_to_string(path).ok()?;
-        let manifest: Manifest = serde_json::from_str(&text).ok()?;
+        let file = BufReader::new(open_file(&path).ok()?);
+        let manifest: Manifest = serde_json::from_reader(file).ok()?;
         let files = || manifest.files.iter().chain(&manifest.previous_files);
         // Names that lead elsewhere are none of ours.
         let is_plain = |f: &ManifestFile| Path::new(&f.name).file_name() == Some(f.name.as_ref());
@@ -191,8 +200,15 @@ impl ResultSet {
             folder: folder.to_owned(),
             command: command.to_owned(),
             staging,
+            keeps_others: false,
             _made: made,
         })
+    }
+
+    /// Files of the set before that have no successor stay in the set.
+    pub fn beside_others(mut self) -> Self {
+        self.keeps_others = true;
+        self
     }
 
     /// The folder to write the results into, each under its own name.
@@ -211,15 +227,24 @@ impl ResultSet {
         let configuration = serde_json::to_value(configuration).map_err(|e| failed(e.into()))?;
         let files = self.staged().map_err(failed)?;
         // Two runs that end together put their sets there one after the other.
-        let folder_lock = File::open(&self.folder).map_err(failed)?;
+        let folder_lock = open_folder(&self.folder).map_err(failed)?;
         lock::wait_for(&folder_lock);
         let before = replaceable(&self.folder, &self.command)?;
         let previous_files = before.map_or(Vec::new(), |m| [m.files, m.previous_files].concat());
-        let switch = Switch::plan(&self.folder, &files, &previous_files).map_err(failed)?;
+        let mut switch = Switch::plan(&self.folder, &files, &previous_files).map_err(failed)?;
         for file in &files {
             refuse_input(&self.folder.join(&file.name))?;
         }
-        self.put(&switch, files, previous_files, configuration)
+        let others = if self.keeps_others {
+            std::mem::take(&mut switch.remove)
+        } else {
+            Vec::new()
+        };
+        let others = others
+            .iter()
+            .map(|name| ManifestFile::of(&self.folder, name));
+        let others = others.collect::<io::Result<_>>().map_err(failed)?;
+        self.put(&switch, [files, others], previous_files, configuration)
             .map_err(failed)?;
         Ok(switch.sentences(&self.folder))
     }
@@ -240,7 +265,7 @@ impl ResultSet {
     fn put(
         &self,
         switch: &Switch,
-        files: Vec<ManifestFile>,
+        [files, others]: [Vec<ManifestFile>; 2],
         previous_files: Vec<ManifestFile>,
         configuration: serde_json::Value,
     ) -> io::Result<()> {
@@ -250,7 +275,7 @@ impl ResultSet {
             version: env!("CARGO_PKG_VERSION").into(),
             command: self.command.clone(),
             complete: false,
-            files,
+            files: [&files[..], &others].concat(),
             previous_files,
             configuration,
         };
@@ -267,7 +292,7 @@ impl ResultSet {
             fs::rename(at(name), at(other))?;
         }
         fs::rename(&during, at(MANIFEST))?;
-        for ManifestFile { name, .. } in &manifest.files {
+        for ManifestFile { name, .. } in &files {
             fs::rename(staging.join(name), at(name))?;
         }
         for name in &switch.remove {
@@ -287,19 +312,27 @@ impl Switch {
             let Some(known) = ours.get(name) else {
                 return Ok(false);
             };
-            let bytes = fs::symlink_metadata(folder.join(name))?.len();
+            let about = fs::symlink_metadata(folder.join(name))?;
             // Hashing is for those that might be.
-            Ok(known.iter().any(|f| f.bytes == bytes)
+            Ok(about.is_file()
+                && known.iter().any(|f| f.bytes == about.len())
                 && known.contains(&&ManifestFile::of(folder, name)?))
         };
         let exists = |name: &str| fs::symlink_metadata(folder.join(name)).is_ok();
         let mut switch = Switch::default();
-        let names = || files.iter().map(|file| &file.name);
-        for name in names().filter(|name| exists(name)) {
-            if folder.join(name).is_dir() {
+        for file in files.iter().filter(|file| exists(&file.name)) {
+            let name = &file.name;
+            let about = fs::symlink_metadata(folder.join(name))?;
+            if about.is_dir() {
                 return Err(io::Error::other(format!("{name} is a folder there")));
             }
-            if !is_ours(name)? {
+            // Nothing is lost of one that says the same.
+            let is_same = || -> io::Result<bool> {
+                Ok(about.is_file()
+                    && about.len() == file.bytes
+                    && ManifestFile::of(folder, name)? == *file)
+            };
+            if !is_ours(name)? && !is_same()? {
                 let other = free_name(name, exists);
                 switch.set_aside.push((name.clone(), other));
             }
@@ -308,7 +341,7 @@ impl Switch {
             let other = free_name(MANIFEST, exists);
             switch.set_aside.push((MANIFEST.into(), other));
         }
-        let needed: BTreeSet<&str> = names().map(String::as_str).collect();
+        let needed: BTreeSet<&str> = files.iter().map(|file| &*file.name).collect();
         for &name in ours.keys().filter(|name| !needed.contains(*name)) {
             match exists(name) {
                 true if is_ours(name)? => switch.remove.push(name.into()),
@@ -397,6 +430,32 @@ mod tests {
             known.sha256,
             "d4735e3a265e16eee03f59718b9b5d03019c07d8b6c51f90da3a666eec13ab35"
         );
+    }
+
+    #[test]
+    fn a_set_beside_others_keeps_those_without_a_successor() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        put(&out, &[("a", "1"), ("b", "2")]);
+        fs::write(out.join("b"), "mine").unwrap();
+        let set = ResultSet::begin(&out, "test").unwrap().beside_others();
+        fs::write(set.staging().join("c"), "3").unwrap();
+        assert_eq!(set.commit(()).unwrap().len(), 1);
+        assert_eq!(
+            listing(&out),
+            owned(&[("a", "1"), ("b", "mine"), ("c", "3")])
+        );
+        let names = Manifest::read(&out).unwrap().files;
+        let names: Vec<&str> = names.iter().map(|file| &*file.name).collect();
+        assert_eq!(names, ["c", "a"]);
+    }
+
+    #[test]
+    fn a_file_that_says_the_same_is_not_set_aside() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("a"), "1").unwrap();
+        assert!(put(dir.path(), &[("a", "1")]).is_empty());
+        assert_eq!(listing(dir.path()), owned(&[("a", "1")]));
     }
 
     #[test]

@@ -14,6 +14,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use sha2::{Digest, Sha256};
 
+use super::guarded::open_file;
+
 const PREFIX: &str = ".gdtof-";
 
 /// The temporaries of this process, and what it has looked for others' leftovers.
@@ -66,7 +68,7 @@ impl Temporary {
     pub(super) fn folder_in(folder: &Path) -> io::Result<Self> {
         Self::make(folder, |path| {
             fs::create_dir(path)?;
-            File::open(path)
+            open_folder(path)
         })
     }
 
@@ -144,6 +146,12 @@ fn is_ours(name: &str) -> bool {
     numbers.is_some_and(|(number, check)| check == check_of(number))
 }
 
+/// Opens a folder, to lock it.
+#[expect(clippy::disallowed_methods, reason = "nothing is read of it")]
+pub(super) fn open_folder(path: &Path) -> io::Result<File> {
+    File::open(path)
+}
+
 /// Removes what runs that are no more left in `folder`.
 fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -152,7 +160,12 @@ fn sweep(folder: &Path) {
             continue;
         }
         let path = entry.path();
-        let Ok(file) = File::open(&path) else {
+        let opened = if path.is_dir() {
+            open_folder(&path).ok()
+        } else {
+            open_file(&path).ok()
+        };
+        let Some(file) = opened else {
             continue;
         };
         if lock::is_free(&file) && lock::is_same(&path, &file) {

@@ -10,7 +10,7 @@ use super::fused::{Fused, MOST_GUIDES};
 use super::{
     BehaviouralStereo, Guide, IntensityStereo, Kalman, MatchedStereo, Monocular, NoisyTruth, Radar,
 };
-use crate::files::InputError;
+use crate::files::{InputError, instead_of};
 use crate::settings::Range::Within;
 use crate::settings::{Document, Key, Settings, keys};
 
@@ -48,10 +48,19 @@ pub const KINDS: &[Kind] = &[
         make: |document| read::<Nothing>(document).map(|_| Arc::new(BehaviouralStereo) as _),
     },
     Kind::of::<NoisyTruth>("truth", "The true distance with a Gaussian error"),
-    Kind::of::<MatchedStereo>(
-        "matched",
-        "The scene's camera pair: images are rendered and matched",
-    ),
+    Kind {
+        make: |document| {
+            let guide: MatchedStereo = read(document)?;
+            guide
+                .check()
+                .map_err(|message| document.refuse("paths", message))?;
+            Ok(Arc::new(guide))
+        },
+        ..Kind::of::<MatchedStereo>(
+            "matched",
+            "The scene's camera pair: images are rendered and matched",
+        )
+    },
     Kind::of::<Monocular>(
         "monocular",
         "Depth from one image: everywhere, but with large errors",
@@ -105,8 +114,19 @@ keys! {
 pub fn parse(text: &str, source: &str) -> Result<Arc<dyn Guide>, InputError> {
     let (name, settings) = text.split_once(':').unwrap_or((text, ""));
     let Some(kind) = KINDS.iter().find(|kind| kind.name == name) else {
-        let names: Vec<&str> = KINDS.iter().map(|kind| kind.name).collect();
-        let message = format!("{name:?} is not a guide; give {}", names.join(", "));
+        let names = || KINDS.iter().map(|kind| kind.name);
+        let given = name.split(',').map(str::trim);
+        let instead = if name.contains(',') && given.clone().all(|part| names().any(|n| n == part))
+        {
+            let each = given.map(|part| format!("{source} {part}"));
+            format!(
+                "give each by itself: {}",
+                each.collect::<Vec<_>>().join(" ")
+            )
+        } else {
+            instead_of(name, names())
+        };
+        let message = format!("{name:?} is not a guide; {instead}");
         return Err(InputError::new(source, message));
     };
     let option = format!("{source} {text}");
@@ -197,14 +217,24 @@ mod tests {
     fn what_is_wrong_is_said_in_one_sentence() {
         for (text, says) in [
             ("lidar", "\"lidar\" is not a guide; give stereo, truth"),
-            ("radar:beam=3", "unknown field `beam`"),
+            ("radar:beam=3", "unknown key `beam`; give"),
+            ("radr", "\"radr\" is not a guide; did you mean `radar`?"),
+            (
+                "stereo,radar",
+                "give each by itself: guide stereo guide radar",
+            ),
+            (
+                "matched:paths=6",
+                "paths = 6 is impossible; give 3, 4, 5 or 8",
+            ),
+            ("radar:range_sigma=3", "did you mean `range_sigma_m`?"),
             (
                 "radar:resolution_m=-1",
                 "resolution_m = -1 is impossible; give 0.01 to 100 m",
             ),
             ("radar:resolution_m=4 ns", "is a time; give a length"),
             ("truth:sigma_m", "has no value; give key=value"),
-            ("stereo:x=1", "unknown field `x`"),
+            ("stereo:x=1", "unknown key `x`; leave it out"),
             ("file", "give file:path=MAP.npy"),
             ("file:path=/nonexistent.npy", "/nonexistent.npy"),
             ("truth:sigma_m=nan", "sigma_m = NaN is impossible"),

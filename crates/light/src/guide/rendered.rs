@@ -55,6 +55,21 @@ const RIM_PX: usize = AROUND;
 const WORSE_BY_MISSING: f64 = 8.0;
 
 impl MatchedStereo {
+    /// What is wrong with keys that have no range of numbers.
+    ///
+    /// # Errors
+    /// When something is.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let numbers = Paths::ALL.map(|paths| paths.number());
+        if numbers.contains(&(self.paths as usize)) {
+            return Ok(());
+        }
+        Err(format!(
+            "paths = {} is impossible; give 3, 4, 5 or 8",
+            self.paths
+        ))
+    }
+
     /// The part of the left image that the lidar sees at any distance, and to its left what the right camera sees of it.
     pub(super) fn crop(&self, input: &GuideInput<'_>) -> Option<Crop> {
         let stereo = &input.scene.stereo;

@@ -13,7 +13,7 @@ use super::rig::Rig;
 use super::rules::{check_object, check_rig, check_stereo};
 use super::settings::{Lidar, Light, Scene, Stereo};
 use super::words::FilterWord;
-use crate::files::InputError;
+use crate::files::{InputError, nearest};
 use crate::settings::{Document, Fault, Key, Range, Section, Settings, commented, schema};
 
 impl Scene {
@@ -67,9 +67,15 @@ impl Scene {
                         faults.extend(scene.lidar.fault());
                     }
                 }
-                ("stereo", Value::Table(given)) => scene.stereo = section(document, name, given, faults),
-                ("light", Value::Table(given)) => scene.light = section(document, name, given, faults),
-                ("medium", Value::Table(given)) => scene.medium = section(document, name, given, faults),
+                ("stereo", Value::Table(given)) => {
+                    scene.stereo = section(document, name, given, faults)
+                }
+                ("light", Value::Table(given)) => {
+                    scene.light = section(document, name, given, faults)
+                }
+                ("medium", Value::Table(given)) => {
+                    scene.medium = section(document, name, given, faults)
+                }
                 ("rig", Value::Table(given)) => scene.rig = section(document, name, given, faults),
                 ("object", Value::Array(items)) => {
                     for (index, item) in items.iter().enumerate() {
@@ -90,9 +96,7 @@ impl Scene {
                 ("lidar" | "stereo" | "light" | "medium" | "rig", _) => faults.push(wrong(
                     "this must be a section; write its name in brackets, and its keys below",
                 )),
-                _ => faults.push(wrong(
-                    "unknown section; give [lidar], [stereo], [light], [medium], [rig], [[object]] or [[interferer]]",
-                )),
+                _ => faults.push(wrong(&instead_of_section(name))),
             }
         }
         if !faults.iter().any(|fault| fault.path.starts_with("stereo.")) {
@@ -137,6 +141,22 @@ impl Scene {
             Scene::SECTIONS,
             &Scene::default().table(),
         )
+    }
+}
+
+/// What to do about the name of a section that is none.
+fn instead_of_section(name: &str) -> String {
+    let has_key = |section: &&Section| section.keys.iter().any(|key| key.name == name);
+    if let Some(section) = Scene::SECTIONS.iter().find(has_key) {
+        let section = section.name;
+        return format!(
+            "a key of [{section}] without its section; did you mean scene.{section}.{name}?"
+        );
+    }
+    let sections = Scene::SECTIONS.iter().map(|section| section.name);
+    match nearest(name, sections) {
+        Some(meant) => format!("unknown section; did you mean [{meant}]?"),
+        None => "unknown section; give [lidar], [stereo], [light], [medium], [rig], [[object]] or [[interferer]]".to_owned(),
     }
 }
 

@@ -11,15 +11,13 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::declare::Settings;
-use crate::files::{InputError, LineEnds, in_plain_words, read_text_within, too_long};
+use crate::files::{
+    InputError, LineEnds, MOST_TOML_BYTES, in_plain_words, nearest, read_text_within,
+};
 
 /// Most items of a list. A scene with this many objects is read and printed in 1.1 s of processor time and 270 MB
 /// (dev profile).
 const MOST_ITEMS: usize = 65_536;
-
-/// Most lines and commas of settings, and most bytes of a file: 16 MiB of `[0,1],` take 4 s and 2 GB to parse, five times the entries.
-const MOST_ENTRIES: usize = 1 << 20;
-const MOST_BYTES: usize = 16 << 20;
 
 /// Something wrong with a setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,17 +59,6 @@ impl Document {
     /// # Errors
     /// When it is no TOML, or has a list that is too long, with the line; when the text is too long.
     pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
-        if text.len() > MOST_BYTES {
-            return Err(too_long(source, MOST_BYTES));
-        }
-        let entries = text.bytes().filter(|byte| matches!(byte, b',' | b'\n'));
-        let entries = entries.count();
-        if entries > MOST_ENTRIES {
-            let message = format!(
-                "has {entries} lines and commas, of which at most {MOST_ENTRIES} are read of settings; give fewer values"
-            );
-            return Err(InputError::new(source, message));
-        }
         let table: Table = crate::files::parse_toml(&source, text)?;
         let mut document = Self::of(source, table);
         if let Ok(spans) = DeTable::parse(text) {
@@ -97,7 +84,7 @@ impl Document {
     /// # Errors
     /// When it cannot be read or is too long.
     pub fn text(path: &Path) -> Result<String, InputError> {
-        read_text_within(path, MOST_BYTES)
+        read_text_within(path, MOST_TOML_BYTES)
     }
 
     /// Settings that stand in no file.
@@ -155,10 +142,16 @@ impl Document {
                         return complain(message);
                     };
                     let Some(index) = index_in(list, which) else {
-                        return complain(format!(
-                            "there is no {name} {which:?}; give the name of one, or its number from 1 to {}",
-                            list.len()
-                        ));
+                        let names = list.iter().filter_map(|item| item.get("name")?.as_str());
+                        return complain(match nearest(which, names) {
+                            Some(meant) => {
+                                format!("there is no {name} {which:?}; did you mean `{meant}`?")
+                            }
+                            None => format!(
+                                "there is no {name} {which:?}; give the name of one, or its number from 1 to {}",
+                                list.len()
+                            ),
+                        });
                     };
                     extend(&mut path, &index.to_string());
                     list[index].as_table_mut().expect("index_in finds tables")
@@ -243,6 +236,12 @@ impl Document {
         }))
     }
 
+    /// A complaint about the value at `path`.
+    pub(crate) fn refuse(&self, path: &str, message: String) -> InputError {
+        let fault = Fault::new(path, message);
+        self.complain(vec![fault]).expect_err("there is one fault")
+    }
+
     /// The line of a value, if it stands in a file.
     pub fn line(&self, path: &str) -> Option<usize> {
         match self.origins.get(path) {
@@ -251,9 +250,17 @@ impl Document {
         }
     }
 
-    /// Where a value stands, or else its section.
+    /// Where a value stands, or else the first in it, or else its section.
     fn origin(&self, path: &str) -> Option<&Origin> {
-        self.origins.get(path).or_else(|| {
+        let within = || {
+            let first = self.origins.range(format!("{path}.")..).next()?;
+            first
+                .0
+                .strip_prefix(path)?
+                .starts_with('.')
+                .then_some(first.1)
+        };
+        self.origins.get(path).or_else(within).or_else(|| {
             let (section, _) = path.rsplit_once('.')?;
             self.origin(section)
         })

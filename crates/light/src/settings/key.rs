@@ -39,6 +39,15 @@ pub enum Range {
     Text,
 }
 
+/// A number, with an exponent outside of `plain`.
+fn in_short(number: f64, plain: std::ops::Range<f64>) -> String {
+    if number == 0.0 || !number.is_finite() || plain.contains(&number.abs()) {
+        format!("{number}")
+    } else {
+        format!("{number:e}")
+    }
+}
+
 impl Range {
     fn holds(self, value: f64) -> bool {
         match self {
@@ -53,10 +62,7 @@ impl Range {
 
 impl std::fmt::Display for Range {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let short = |x: f64| match x.abs() {
-            a if a != 0.0 && !(1e-3..1e5).contains(&a) => format!("{x:e}"),
-            _ => format!("{x}"),
-        };
+        let short = |x: f64| in_short(x, 1e-3..1e5);
         match *self {
             Range::Within(least, f64::MAX) => write!(f, "{} or more", short(least)),
             Range::Above(below, f64::MAX) => write!(f, "above {}", short(below)),
@@ -183,8 +189,10 @@ impl Key {
             _ => String::new(),
         };
         Some(format!(
-            "{} = {number} is impossible; give {}{unit}{because}",
-            self.name, self.range
+            "{} = {} is impossible; give {}{unit}{because}",
+            self.name,
+            in_short(number, 1e-6..1e15),
+            self.range
         ))
     }
 }

@@ -1,5 +1,7 @@
 //! Numbers with units as text: `"384 MHz"`, `"8 ns"`, `"20 %"`.
 
+use crate::files::nearest;
+
 /// What units measure, in words for complaints: symbols, each with its power of ten of the base unit.
 const UNITS: [(&str, &[(&str, i32)]); 20] = [
     (
@@ -102,7 +104,17 @@ pub(super) fn in_unit(text: &str, wanted: &str) -> Result<f64, String> {
         _ => match unit(symbol) {
             Some((found, power)) if found == dimension => power,
             Some((found, _)) => return Err(format!("is {found}; {cure}")),
-            None => return Err(format!("has an unknown unit; {cure}")),
+            None => {
+                let known = UNITS.iter().find(|(known, _)| *known == dimension);
+                let names = known
+                    .into_iter()
+                    .flat_map(|(_, units)| units.iter().map(|(name, _)| *name));
+                let meant = names.clone().find(|name| name.eq_ignore_ascii_case(symbol));
+                return Err(match meant.or_else(|| nearest(symbol, names)) {
+                    Some(name) => format!("has an unknown unit; did you mean {name}?"),
+                    None => format!("has an unknown unit; {cure}"),
+                });
+            }
         },
     };
     let not_a_number = || format!("is not a number with a unit; {cure}");
@@ -177,7 +189,11 @@ mod tests {
             "is a time; give a frequency such as \"1 Hz\", or a plain number of Hz"
         );
         assert!(says("8 m", "").starts_with("is a length; give a plain number"));
-        assert!(says("8 parsec", "m").starts_with("has an unknown unit"));
+        assert!(says("8 parsec", "m").starts_with("has an unknown unit; give a length"));
+        assert_eq!(
+            says("8 Mhz", "Hz"),
+            "has an unknown unit; did you mean MHz?"
+        );
         for text in ["", "ns", "1.2.3 ns", "--1 ns", "1e99999 ns", "eight ns"] {
             assert!(in_unit(text, "ns").is_err(), "{text}");
         }

@@ -14,6 +14,7 @@
 mod family;
 mod flip_flops;
 
+use crate::nearest;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
@@ -140,8 +141,12 @@ impl<'g, 't> Maker<'g, 't> {
                 _ => false,
             });
             let Some(cell) = fits else {
+                let alike = nearest(name, self.candidates.iter().map(|c| c.name()));
+                let instead = alike.filter(|alike| *alike != name);
+                let instead =
+                    instead.map_or(String::new(), |alike| format!("; did you mean `{alike}`?"));
                 return Err(fault(format!(
-                    "the library {} has no cell {name} that does what {} does",
+                    "the library {} has no cell {name} that does what {} does{instead}",
                     library.name(),
                     kind.name()
                 )));

@@ -59,7 +59,7 @@ fn optics_that_cannot_be_are_refused_with_their_line() {
             "filter = [[930, 0.9], [945, 1.7]]",
             "transmittance of 1.7; give 0 to 1",
         ),
-        ("filter = \"brick\"", "filter: unknown variant `brick`"),
+        ("filter = \"brick\"", "filter: `brick` is impossible"),
         ("filter = 3", "3 is neither a word nor a list of pairs"),
         (
             "pde_curve = [[400, 0.3], [900, 0.1]]",
@@ -153,9 +153,9 @@ fn all_faults_are_told_at_once_with_their_lines() {
     for (line, says) in [
         "s.toml:2: in [lidar], pde = 1.5 is impossible; give 0 to 1",
         "s.toml:3: in [lidar], fov_deg = \"8 ns\" is a time; give an angle",
-        "s.toml:4: in [lidar], unknown field `colour`",
+        "s.toml:4: in [lidar], unknown key `colour`",
         "s.toml:6: in [light], illuminance_klux = NaN is impossible; give 0 to 200 klux",
-        "s.toml:9: in [[object]] number 1 (a), kind: unknown variant `cone`",
+        "s.toml:9: in [[object]] number 1 (a), kind: `cone` is impossible",
         "s.toml:10: in [[object]] number 1 (a), reflectivity = -1 is impossible",
         "s.toml:11: in [[object]] number 2, lacks `name`",
         "s.toml:13: weather: unknown section",

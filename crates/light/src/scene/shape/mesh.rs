@@ -109,14 +109,13 @@ impl Mesh {
     /// When it cannot be read, is broken, has no triangles or more than four million, a concave face, or a corner that is no number.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let complain = |message: String| InputError::new(path.display(), message);
-        let unreadable = |e: std::io::Error| {
-            complain(format!(
-                "cannot be read ({e}); check the path and its permissions"
-            ))
-        };
-        let about = std::fs::metadata(path).map_err(unreadable)?;
+        let unreadable = |e| InputError::unreadable(path, &e);
+        let file = open_input(path)?;
+        let about = file.metadata().map_err(unreadable)?;
         if !about.is_file() {
-            return Err(complain("is not a file; give an OBJ file".into()));
+            return Err(complain(
+                "is a pipe; write its contents to a file first".into(),
+            ));
         }
         if about.len() > MOST_BYTES {
             let message = format!(
@@ -127,7 +126,7 @@ impl Mesh {
             return Err(complain(message));
         }
         let mut reader = Counted {
-            inner: BufReader::new(open_input(path).map_err(unreadable)?),
+            inner: BufReader::new(file),
             lines: 0,
         };
         if reader.fill_buf().map_err(unreadable)?.starts_with(MARK) {
@@ -344,6 +343,10 @@ impl Listed {
                 }
                 for third in 2..corners_of_face {
                     let triangle = [0, third - 1, third];
+                    // What has no area is met by no ray; thousands in one place would be tried by every ray.
+                    if !has_area(triangle.map(|n| at(indices[n]))) {
+                        continue;
+                    }
                     all.triangles.push(triangle.map(|n| indices[n] + first));
                     if is_textured {
                         let on_texture = &read.texcoord_indices[face.clone()];
@@ -354,6 +357,12 @@ impl Listed {
         }
         Ok(all)
     }
+}
+
+fn has_area(corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
+    // Not a number is told as such later.
+    (b - a).cross(c - a) != DVec3::ZERO
 }
 
 /// Whether a polygon turns the other way at some corner. Its normal is Newell's.

@@ -17,6 +17,7 @@ use super::library_files::library_files;
 use super::library_text::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
+use crate::files::instead_of;
 use crate::netlist::liberty::{Characterised, Environment, Liberty};
 use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
 
@@ -220,10 +221,11 @@ fn wanted_cells(text: &str) -> Result<Vec<(CellKind, String)>, String> {
             Some((kind, name.trim().to_owned()))
         });
         found.ok_or_else(|| {
-            let names: Vec<&str> = kinds.clone().map(CellKind::name).collect();
+            let kind = pair.split('=').next().unwrap_or_default().trim();
+            let names = kinds.clone().map(CellKind::name);
             format!(
-                "{pair:?} is not KIND=NAME with a kind among {}",
-                names.join(", ")
+                "{pair:?} is not KIND=NAME with a kind of cell; {}",
+                instead_of(kind, names)
             )
         })
     };

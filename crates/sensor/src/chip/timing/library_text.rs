@@ -7,7 +7,7 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
-use crate::files::open_input;
+use crate::files::{InputError, open_input};
 use crate::netlist::liberty::liberty_text;
 
 /// Most bytes of a library: the largest open ones have 60 MB a corner.
@@ -21,8 +21,8 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// # Errors
 /// A file that cannot be read, is too large or no text.
 pub(super) fn read_library(path: &Path) -> Result<String, String> {
-    let said = |error: std::io::Error| format!("cannot be read: {error}");
-    let mut file = open_input(path).map_err(said)?;
+    let said = |error| InputError::unreadable(path, &error).message;
+    let mut file = open_input(path).map_err(|error| error.message)?;
     let mut head = Vec::new();
     (&mut file).take(2).read_to_end(&mut head).map_err(said)?;
     let is_packed = head == GZIP;
@@ -33,18 +33,24 @@ pub(super) fn read_library(path: &Path) -> Result<String, String> {
         Box::new(whole)
     };
     let mut bytes = Vec::new();
-    (&mut unpacked)
-        .take(MOST_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(said)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(format!(
-            "has more than {} MB; give a library of one corner",
-            MOST_BYTES >> 20
-        ));
+    let no_text = || "is not text; give a Liberty file, .lib or .lib.gz".to_owned();
+    loop {
+        let part = (&mut unpacked).take(1 << 20).read_to_end(&mut bytes);
+        let part = part.map_err(said)?;
+        if part == 0 {
+            return liberty_text(bytes).ok_or_else(no_text);
+        }
+        // What is no text is not read to its end, which it need not have.
+        if bytes[bytes.len() - part..].contains(&0) {
+            return Err(no_text());
+        }
+        if bytes.len() as u64 > MOST_BYTES {
+            return Err(format!(
+                "has more than {} MB; give a library of one corner",
+                MOST_BYTES >> 20
+            ));
+        }
     }
-    liberty_text(bytes)
-        .ok_or_else(|| "is not text; give a Liberty file, .lib or .lib.gz".to_owned())
 }
 
 #[cfg(test)]
