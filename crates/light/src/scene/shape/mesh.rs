@@ -359,8 +359,9 @@ impl Listed {
     }
 }
 
-fn has_area(corners: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
+/// Whether a triangle is more than a line.
+fn has_area(corners: [[f64; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(DVec3::from_array);
     // Not a number is told as such later.
     (b - a).cross(c - a) != DVec3::ZERO
 }
