@@ -29,7 +29,7 @@ enum Role {
 fn role(command: &str, argument: &str) -> Role {
     use Role::*;
     match (command, argument) {
-        ("sweep merge", "folders") | ("page" | "export frame", "folder") => InputFolder,
+        ("sweep merge", "folders") | ("page", "folder") | ("export frame", "frame") => InputFolder,
         (_, "block") => Input("p_counter="),
         (_, "set") => Input("sensor.liberty="),
         (_, "guide" | "guides") => Input("file:path="),
@@ -64,7 +64,7 @@ fn besides(command: &str, argument: &str) -> &'static str {
         ("replay", "vcd" | "saif" | "sdf") => "--engine gate",
         ("replay", "checks_json") => "--engine gate --checks report",
         ("timing", "plot") => "--mismatch 0.05",
-        ("range", "calibration") => "--fit none",
+        ("range", "calibration") => "",
         ("range", "frame") => "--format frame",
         ("export verilog", "sdf" | "inits" | "events") => {
             "--inits inits.csv --events events.csv --rows 1 --cols 2 --stop-periods 100 --laser-cycles 5"
@@ -206,7 +206,7 @@ fn no_file_in_a_folder_of_results_is_waited_for() {
         (
             "swept/study.json",
             "sweep study.toml --out swept".into(),
-            true,
+            false,
         ),
         ("swept/study.json", "sweep merge swept".into(), false),
         ("swept/journal-9.log", "sweep merge swept".into(), true),

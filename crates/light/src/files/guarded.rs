@@ -135,7 +135,7 @@ const FOLDER_THERE: &str = "is a folder; give the name of a file";
 ///
 /// # Errors
 /// A folder, a pipe or a device.
-pub(super) fn refuse_special(path: &Path) -> Result<(), InputError> {
+fn refuse_special(path: &Path) -> Result<(), InputError> {
     let complain = |message: &str| Err(InputError::new(path.display(), message));
     match fs::metadata(path) {
         Ok(about) if about.is_dir() => complain(FOLDER_THERE),
@@ -146,11 +146,12 @@ pub(super) fn refuse_special(path: &Path) -> Result<(), InputError> {
     }
 }
 
-/// Complains if a single file at `path` would replace one that this run has read, or one of a set of results.
+/// Complains if a single file at `path` would replace one that this run has read, one of a set of results, or what is no file.
 ///
 /// # Errors
 /// When it would.
 pub(super) fn refuse_to_replace(path: &Path) -> Result<(), InputError> {
+    refuse_special(path)?;
     refuse_input(path)?;
     let Some(command) = owner_of(path) else {
         return Ok(());

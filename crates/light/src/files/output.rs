@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::guarded::{refuse_input, refuse_special, refuse_to_replace};
+use super::guarded::{refuse_input, refuse_to_replace};
 use super::temporary::Temporary;
 use femtogate::InputError;
 
@@ -27,7 +27,6 @@ impl OutputFile {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
         };
-        refuse_special(path)?;
         refuse_to_replace(path)?;
         let (temporary, file) = Temporary::file_in(folder).map_err(unwritable)?;
         Ok(OutputFile {
