@@ -47,7 +47,7 @@ fn what_was_meant_is_named() {
         ),
         (
             "sensor --set sensor.colour=3",
-            "unknown key `colour`; it is like none of the",
+            "unknown key `colour`; give one of the",
         ),
         (
             "scene --set scene.lidar.pd=0.2",

@@ -45,7 +45,7 @@ pub fn instead_of<'k>(given: &str, known: impl IntoIterator<Item = &'k str>) -> 
             format!("give {} or {last}", others.join(", "))
         }
         (None, Some(_)) => format!(
-            "it is like none of the {} names that there are",
+            "give one of the {} names that there are",
             known.len()
         ),
     }
@@ -197,7 +197,7 @@ mod tests {
         assert_eq!(instead_of("clkhz", keys), "did you mean `clk_hz`?");
         let many: Vec<String> = (0..45).map(|n| format!("k{n}")).collect();
         let many = instead_of("zzz", many.iter().map(String::as_str));
-        assert_eq!(many, "it is like none of the 45 names that there are");
+        assert_eq!(many, "give one of the 45 names that there are");
     }
 
     #[test]

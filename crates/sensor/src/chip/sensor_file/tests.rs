@@ -228,7 +228,7 @@ fn numbers_may_have_units_and_all_faults_are_told() {
     for (line, says) in [
         "s.toml:1: rows = 0 is impossible; give 1 to 256",
         "s.toml:2: clk_hz = \"8 ns\" is a time; give a frequency",
-        "s.toml:3: unknown field `colour`",
+        "s.toml:3: unknown key `colour`",
         "s.toml:4: bins = 2.5 is impossible; give a whole number, 1 to 64",
         "s.toml:5: mode: a word belongs here; give guided, conventional",
     ]
