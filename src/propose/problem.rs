@@ -152,10 +152,13 @@ impl Problem {
         (self.signal_per_uj * pulse_energy_uj, self.background_hz)
     }
 
-    /// The most energy that a single pulse may have, uJ.
+    /// The most energy that eyes and SPADs allow a single pulse, uJ.
     pub(super) fn most_energy_uj(&self) -> f64 {
         let judged = self.emission.beside_class_1();
-        1.0 / judged.expect("a judged wavelength").times_class_1
+        let of_eyes_uj = 1.0 / judged.expect("a judged wavelength").times_class_1;
+        // Within rounding of it a pulse blinds nobody.
+        let most_photons = MOST_PHOTONS_A_SPAD * self.sensor.spads() as f64 * (1.0 - 1e-9);
+        of_eyes_uj.min(most_photons / self.signal_per_uj)
     }
 
     /// Whether a chip meets its timing.

@@ -99,7 +99,7 @@ fn guides_that_cannot_be_are_refused_in_one_sentence() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path();
     write_map(&folder.join("small.npy"), 4, 4, 40.0);
-    write_map(&folder.join("nan.npy"), 16, 16, f64::NAN);
+    write_map(&folder.join("behind.npy"), 16, 16, -1.0);
     std::fs::write(folder.join("text.npy"), "40, 41\n").unwrap();
     let before = std::fs::read_dir(folder).unwrap().count();
     for (further, says) in [
@@ -112,8 +112,8 @@ fn guides_that_cannot_be_are_refused_in_one_sentence() {
             "small.npy: this map has 4x4 macropixels and the sensor 16x16",
         ),
         (
-            ["--guide", "file:path=nan.npy"],
-            "nan.npy: has NaN in row 0, column 0",
+            ["--guide", "file:path=behind.npy"],
+            "behind.npy: has -1 at row 0, column 0",
         ),
         (
             ["--guide", "file:path=text.npy"],

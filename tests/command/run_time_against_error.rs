@@ -123,7 +123,7 @@ fn a_piped_comparison_says_how_far_it_is_and_what_differs() {
     assert!(!table.lines().any(|line| line.starts_with("gate")));
     let messages = String::from_utf8(output.stderr).unwrap();
     assert!(
-        messages.starts_with("1 of 16 engines and walls"),
+        messages.starts_with("gdtof: 1 of 16 engines and walls"),
         "{messages}"
     );
     assert!(!messages.contains('\x1b'), "{messages}");

@@ -44,10 +44,7 @@ pub fn instead_of<'k>(given: &str, known: impl IntoIterator<Item = &'k str>) -> 
         (None, Some((last, others))) if known.len() <= MOST_LISTED => {
             format!("give {} or {last}", others.join(", "))
         }
-        (None, Some(_)) => format!(
-            "give one of the {} names that there are",
-            known.len()
-        ),
+        (None, Some(_)) => format!("give one of the {} names that there are", known.len()),
     }
 }
 
