@@ -95,10 +95,9 @@ def test_players_find_every_moment_of_a_recording(recorded: Path) -> None:
         cloud = topics["/lidar/points"][number][2]
         there = np.count_nonzero(~np.isnan(depths[number]))
         kinds = {7: "<f4", 3: "<u2"}
-        fields = [(field["name"], kinds[field["type"]], field["offset"]) for field in cloud["fields"]]
-        names, formats, offsets = zip(*fields)
-        layout = {"names": names, "formats": formats, "offsets": offsets, "itemsize": cloud["point_stride"]}
-        points = np.frombuffer(base64.b64decode(cloud["data"]), np.dtype(layout))
+        layout = np.dtype([(field["name"], kinds[field["type"]]) for field in cloud["fields"]])
+        assert layout.itemsize == cloud["point_stride"]
+        points = np.frombuffer(base64.b64decode(cloud["data"]), layout)
         assert np.count_nonzero(points["return"] == 1) == there and points["return"].max() <= 4
         picture = base64.b64decode(topics["/lidar/picture"][number][2]["data"])
         assert picture == (recorded / f"depth_{number:05}.png").read_bytes()
