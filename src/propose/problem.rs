@@ -249,11 +249,11 @@ impl Problem {
             fps,
             ..
         } = self.goal;
+        let (periods, counter_bits) = self.reach(window)?;
         let photons = self.light(window.pulse_energy_uj).0 / self.sensor.spads() as f64;
         if photons > MOST_PHOTONS_A_SPAD {
             return Err(Limit::Blinding { photons });
         }
-        let (periods, counter_bits) = self.reach(window)?;
         let bin_m = 0.5 * SPEED_OF_LIGHT_M_PER_S / window.clk_hz;
         let window_m = seen.usable_bins() as f64 * bin_m;
         let step_m = self.sensor.step_periods as f64 * bin_m;

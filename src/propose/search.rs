@@ -121,6 +121,8 @@ impl Gathered {
         let rank = |limit: &Limit| match *limit {
             Limit::Light { .. } => 2.0,
             Limit::Guide { share, .. } => 1.0 + share,
+            // Less energy is tried, too.
+            Limit::Blinding { .. } => -1.0,
             _ => 0.0,
         };
         if self

@@ -338,3 +338,20 @@ fn no_random_design_beats_the_front() {
         }
     }
 }
+
+/// 2⁹ periods of 384 MHz end at 199.9 m, whatever the light.
+#[test]
+fn a_sensor_that_does_not_reach_is_told_so() {
+    let goal = Goal {
+        range_m: 199.0,
+        illuminance_klux: 1.0,
+        fps: 5.0,
+        ..NEAR
+    };
+    let mut scene = Scene::outdoor();
+    (scene.lidar.lens_diameter_mm, scene.lidar.laser_source_mm) = (25.0, 10.0);
+    let problem = Problem::new(goal, Sensor::default(), &scene).unwrap();
+    let found = search(&problem, &small(), 3, |_| ()).unwrap();
+    let is_reach = matches!(found.own, Own::Impossible(Limit::Reach { bits: 9, .. }));
+    assert!(is_reach, "{:?}", found.own);
+}
