@@ -212,10 +212,6 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     Ok(tell(text)?)
 }
 
-fn write_text(path: &Path, text: &str) -> Result<(), InputError> {
-    OutputFile::write_with(path, |out| out.write_all(text.as_bytes()))
-}
-
 fn file_names(folder: &Path) -> std::io::Result<String> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder)? {
@@ -235,7 +231,7 @@ fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<Stri
         write_ply(&folder.join(format!("{name}_{number:03}.ply")), points)?;
     }
     let json = serde_json::to_string_pretty(&shown.frames)?;
-    write_text(&folder.join(format!("{name}.json")), &(json + "\n"))?;
+    OutputFile::write_text(&folder.join(format!("{name}.json")), &(json + "\n"))?;
     let [load_s, exposure_s, readout_s] = shown.chip_s.map(|s| s * 1e3);
     let mut text = format!(
         "{name}: guide {:.0} ms, load {load_s:.2} ms, exposure {exposure_s:.1} ms, readout {readout_s:.2} ms: {:.2} fps\n",
@@ -260,7 +256,7 @@ fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<Stri
 /// What 200 m at 25 fps take.
 fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(limits)?;
-    write_text(&folder.join("limit.json"), &(json + "\n"))?;
+    OutputFile::write_text(&folder.join("limit.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(
         "laser | cycles | energy | stereo error | in window | right to a bin | wrong | no peak",
     );
@@ -291,7 +287,7 @@ fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String
 /// What a disturbance costs each scheme.
 fn write_disturbed(folder: &Path, name: &str, outcomes: &[Outcome]) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(outcomes)?;
-    write_text(&folder.join("outcomes.json"), &(json + "\n"))?;
+    OutputFile::write_text(&folder.join("outcomes.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(&format!(
         "{name} | scheme | bins | wrong | no depth | mean error, m"
     ));
@@ -321,7 +317,7 @@ fn write_sweep(folder: &Path, points: &[sweep::SweepPoint]) -> anyhow::Result<St
         chart.write(&folder.join(format!("fig_{number}.svg")))?;
     }
     let json = serde_json::to_string_pretty(points)?;
-    write_text(&folder.join("sweep.json"), &(json + "\n"))?;
+    OutputFile::write_text(&folder.join("sweep.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(
         "distance, m | depths | in window | mean error, m | sigma, m | RMS, m | guide RMS, m",
     );

@@ -13,7 +13,7 @@ use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
 use super::voice::{notes, progress, say_file, tell};
 use crate::engine::Work;
-use crate::files::{InputError, MANIFEST, ResultSet};
+use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
 use crate::request::{Exposed, Spelling, check_drive_times};
 use crate::system::{
@@ -234,13 +234,13 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     }
     report.run_time_s = began.elapsed().as_secs_f64();
     let json = serde_json::to_string_pretty(&report)?;
-    let unwritable = |e| InputError::unwritable(&args.out, &e);
-    std::fs::write(results.staging().join("drive.json"), format!("{json}\n"))
-        .map_err(unwritable)?;
+    let file = results.staging().join("drive.json");
+    OutputFile::write_text(&file, &format!("{json}\n"))?;
     notes(results.commit(&configuration)?);
-    match args.json {
-        true => Ok(say_file(format_args!("{json}\n"))?),
-        false => Ok(tell(report.table(&args.out))?),
+    if args.json {
+        Ok(say_file(format_args!("{json}\n"))?)
+    } else {
+        Ok(tell(report.table(&args.out))?)
     }
 }
 

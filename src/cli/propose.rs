@@ -117,9 +117,9 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     write_designs(&staging.join("designs.csv"), &found, &corners)?;
     chart(&problem, &found, proposed, area).write(&staging.join("front.svg"))?;
     let chip = Sensor::from(problem.config_of(&proposed.design));
-    write_text(&staging.join("sensor.toml"), &chip.commented())?;
+    OutputFile::write_text(&staging.join("sensor.toml"), &chip.commented())?;
     let target = problem.scene_of(&proposed.design);
-    write_text(&staging.join("scene.toml"), &target.commented())?;
+    OutputFile::write_text(&staging.join("scene.toml"), &target.commented())?;
     let asked = serde_json::json!({
         "goal": goal,
         "sensor": SensorConfig::clone(problem.sensor()),
@@ -176,10 +176,6 @@ fn asked(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
         Some(fault) => Err(InputError::new("what is asked", fault)),
         None => Ok((goal, space)),
     }
-}
-
-fn write_text(path: &Path, text: &str) -> Result<(), InputError> {
-    OutputFile::write_with(path, |out| out.write_all(text.as_bytes()))
 }
 
 /// In what areas are.

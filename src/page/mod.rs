@@ -58,6 +58,6 @@ impl Page {
     /// When it cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), InputError> {
         set_aside_foreign(path, begins_with(html::SIGNATURE))?;
-        OutputFile::write_with(path, |w| w.write_all(self.html.as_bytes()))
+        OutputFile::write_text(path, &self.html)
     }
 }

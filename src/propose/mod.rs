@@ -36,6 +36,6 @@ pub use check::{Check, gates_agree};
 pub use confirm::Confirmed;
 pub use front::{dominates, front};
 pub use goal::{Choice, Goal, Space};
-pub use point::{Candidate, Costs, Design, Limit, Point};
+pub use point::{Candidate, Costs, Design, Limit, NotFound, Point};
 pub use problem::Problem;
-pub use search::{Found, NotFound, Own, Step, search};
+pub use search::{Found, Own, Step, search};

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::scene::EyeRule;
+use crate::system::FrameError;
 
 /// A chip, its laser and its guide.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -170,4 +171,15 @@ pub enum Limit {
     /// Bins overflow.
     #[error("bins: the fullest has {times:.1} times the counts that {bits} bits hold")]
     Counts { times: f64, bits: usize },
+}
+
+/// Why nothing is found.
+#[derive(Debug, thiserror::Error)]
+pub enum NotFound {
+    /// No design will do.
+    #[error(transparent)]
+    Limit(#[from] Limit),
+    /// An engine refuses a design.
+    #[error(transparent)]
+    Engine(#[from] FrameError),
 }

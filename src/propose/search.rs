@@ -9,10 +9,9 @@ use rayon::prelude::*;
 use super::confirm::{Confirmed, confirmed};
 use super::front::{dominates, front};
 use super::goal::{Choice, Space};
-use super::point::{Candidate, Limit, Point};
+use super::point::{Candidate, Limit, NotFound, Point};
 use super::problem::{MOST_CYCLES, Problem};
 use crate::chip::SensorConfig;
-use crate::system::FrameError;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Pulses a second that are tried below the most that the range allows, 1/s: of 200 kHz and its multiples fewer pulses
@@ -42,7 +41,7 @@ const ABOVE: i32 = 3;
 /// The best designs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// What nothing beats.
+    /// The Pareto front, the least laser power first.
     pub front: Vec<Confirmed>,
     /// Designs that were judged.
     pub tried: u64,
@@ -57,17 +56,6 @@ pub enum Step {
     Clock,
     /// A design is checked.
     Check,
-}
-
-/// Why nothing is found.
-#[derive(Debug, thiserror::Error)]
-pub enum NotFound {
-    /// No design will do.
-    #[error(transparent)]
-    Limit(#[from] Limit),
-    /// An engine refuses a design.
-    #[error(transparent)]
-    Engine(#[from] FrameError),
 }
 
 /// What becomes of the sensor as it is, with the laser and guide that suit it best.
@@ -335,11 +323,10 @@ pub fn search(
     let solved_for = solved(problem, false, &gathered.points);
     let tried = gathered.tried + of_own.tried + solved_for.len() as u64;
     let points = [gathered.points, solved_for].concat();
-    let front = match confirmed(problem, points, seed, || done(Step::Check))? {
-        Ok(front) => front,
-        Err(Some(unconfirmed)) => return Err(unconfirmed.into()),
-        Err(None) => return Err(limit_of(problem, &space, false).into()),
-    };
+    let front = confirmed(problem, points, seed, || done(Step::Check))?;
+    if front.is_empty() {
+        return Err(limit_of(problem, &space, false).into());
+    }
     let own = match timed(problem, sensor) {
         Err(limit) => Own::Impossible(limit),
         Ok(()) if of_own.points.is_empty() => Own::Impossible(limit_of(problem, &own_space, true)),

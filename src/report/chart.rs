@@ -291,7 +291,7 @@ impl Chart {
     /// # Errors
     /// When one of the files cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), InputError> {
-        OutputFile::write_with(path, |out| out.write_all(self.svg().as_bytes()))?;
+        OutputFile::write_text(path, &self.svg())?;
         let numbers = path.with_extension("csv");
         set_aside_foreign(&numbers, begins_with(&self.csv_headings()))?;
         OutputFile::write_with(&numbers, |out| self.write_csv(out))

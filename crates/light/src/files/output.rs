@@ -47,6 +47,14 @@ impl OutputFile {
         self.temporary.rename(&self.path).map_err(unwritable)
     }
 
+    /// Writes a text as a whole file.
+    ///
+    /// # Errors
+    /// As [`OutputFile::write_with`].
+    pub fn write_text(path: &Path, text: &str) -> Result<(), InputError> {
+        Self::write_with(path, |out| out.write_all(text.as_bytes()))
+    }
+
     /// Writes a whole file through `fill`.
     ///
     /// # Errors

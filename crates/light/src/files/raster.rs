@@ -47,6 +47,22 @@ impl Raster {
     /// # Errors
     /// As [`Raster::read`]; a picture in colour; a PNG without `unit`, which `unit_key` names; a negative number.
     pub fn read_map(path: &Path, unit: Option<f64>, unit_key: &str) -> Result<Self, InputError> {
+        let mut raster = Self::read_numbers(path, unit, unit_key)?;
+        for value in raster.values.iter_mut().filter(|value| !value.is_finite()) {
+            *value = 0.0;
+        }
+        Ok(raster)
+    }
+
+    /// Reads a map whose 0 is a value; where there is none it has NaN or infinity.
+    ///
+    /// # Errors
+    /// As [`Raster::read_map`].
+    pub(crate) fn read_numbers(
+        path: &Path,
+        unit: Option<f64>,
+        unit_key: &str,
+    ) -> Result<Self, InputError> {
         let complain = |message: String| Err(InputError::new(path.display(), message));
         let (mut raster, is_colour) = Self::read_any(path)?;
         if is_colour {
@@ -66,7 +82,7 @@ impl Raster {
                     "has {value} at row {row}, column {col}; write 0 where there is no value"
                 ));
             }
-            raster.values[at] = if value.is_finite() { value as f32 } else { 0.0 };
+            raster.values[at] = value as f32;
         }
         Ok(raster)
     }

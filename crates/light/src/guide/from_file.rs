@@ -55,7 +55,7 @@ impl FileMap {
             FileSigma::Same(sigma_m) => vec![sigma_m; rows * cols],
             FileSigma::Map(sigma_path) => {
                 // A standard deviation of 0 is one.
-                let sigmas = Raster::read(sigma_path)?;
+                let sigmas = Raster::read_numbers(sigma_path, None, "metres")?;
                 let complain = |message| Err(InputError::new(sigma_path.display(), message));
                 if (sigmas.height, sigmas.width) != (rows, cols) {
                     return complain(format!(
@@ -63,13 +63,6 @@ impl FileMap {
                         sigmas.height,
                         sigmas.width,
                         path.display()
-                    ));
-                }
-                if let Some(at) = sigmas.values.iter().position(|&sigma_m| sigma_m < 0.0) {
-                    let (row, col) = (at / cols, at % cols);
-                    return complain(format!(
-                        "has {} at row {row}, column {col}; give standard deviations in metres",
-                        sigmas.values[at]
                     ));
                 }
                 sigmas.values.iter().map(|&m| m.into()).collect()

@@ -107,9 +107,10 @@ pub fn late_edge(time: f64, sigma: f64, tau: f64) -> [f64; 3] {
     let (z, k) = (time / sigma, sigma / tau);
     let (x, density) = (k - z, normal_density(z));
     // What has been absorbed and not yet come.
-    let pending = match x > 0.0 {
-        true => 0.5 * libm::exp(-0.5 * z * z) * erfcx(x * FRAC_1_SQRT_2),
-        false => libm::exp(k * (0.5 * k - z)) * normal_above(x),
+    let pending = if x > 0.0 {
+        0.5 * libm::exp(-0.5 * z * z) * erfcx(x * FRAC_1_SQRT_2)
+    } else {
+        libm::exp(k * (0.5 * k - z)) * normal_above(x)
     };
     let share = (normal_above(-z) - pending).max(0.0);
     [share, pending / tau, k * (density - k * pending)]

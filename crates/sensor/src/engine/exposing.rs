@@ -132,7 +132,7 @@ fn refuse_floods(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), Engin
     let lit = pixels
         .iter()
         .filter_map(|pixel| Some((pixel.number, pixel.light.as_ref()?)));
-    // Few have so many photons at all.
+    // Most macropixels have fewer, and their parts need no look.
     let flooded = lit.filter(|(_, light)| light.signal_per_cycle() > MOST_ECHO_PHOTONS);
     for (number, light) in flooded {
         for part in stream.parts(number, light) {

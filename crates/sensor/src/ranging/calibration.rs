@@ -74,6 +74,10 @@ impl Calibration {
         };
         for zone in 0..zones {
             let (arrivals, counts, depths) = of_zone(zone);
+            // A single distance leaves the line's slope free, and the offset takes all of the error.
+            if distinct(&depths) < 3 {
+                return Err(CalibrationError::TooFew(zone));
+            }
             let line = |y: &[f64]| Line::through(&arrivals, y);
             let (Some(of_counts), Some(of_depths)) = (line(&counts), line(&depths)) else {
                 return Err(CalibrationError::TooFew(zone));
@@ -118,6 +122,14 @@ impl Calibration {
     }
 }
 
+/// How many different values there are.
+fn distinct(values: &[f64]) -> usize {
+    let mut values = values.to_vec();
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    values.len()
+}
+
 /// A least-squares line.
 struct Line {
     slope: f64,
@@ -128,10 +140,7 @@ struct Line {
 impl Line {
     /// Through at least three points at three different x.
     fn through(x: &[f64], y: &[f64]) -> Option<Self> {
-        let mut distinct = x.to_vec();
-        distinct.sort_unstable_by(f64::total_cmp);
-        distinct.dedup();
-        if distinct.len() < 3 {
+        if distinct(x) < 3 {
             return None;
         }
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
@@ -169,13 +178,24 @@ mod tests {
     #[test]
     fn a_zone_that_saw_too_little_is_named() {
         let echoes: Vec<(Echo, f64)> = (0..5)
-            .flat_map(|i| [(echo(0, i as f64, 1.0), 0.1), (echo(1, 2.0, 1.0), 0.1)])
+            .flat_map(|i| {
+                let at = f64::from(i);
+                [(echo(0, at, 1.0), 0.1 * at), (echo(1, 2.0, 1.0), 0.1 * at)]
+            })
             .collect();
         assert_eq!(
             Calibration::fit(2, &echoes),
             Err(CalibrationError::TooFew(1))
         );
         assert_eq!(Calibration::fit(1, &[]), Err(CalibrationError::TooFew(0)));
+        // Arrivals are noisy where the target stands still.
+        let still: Vec<(Echo, f64)> = (0..5)
+            .map(|i| (echo(0, 7.0 + 0.01 * f64::from(i), 1.0), 0.5))
+            .collect();
+        assert_eq!(
+            Calibration::fit(1, &still),
+            Err(CalibrationError::TooFew(0))
+        );
     }
 
     #[test]
