@@ -330,7 +330,7 @@ fn table(
         ),
     );
     table.push(
-        "laser, beside class 1",
+        "laser",
         eye_safety(settings, settings.exposure.laser_cycles, frame),
     );
     let left_over = Time::from_s(timing.slack_ps * 1e-12);
@@ -374,13 +374,15 @@ fn eye_safety(settings: &FrameSettings, laser_cycles: u32, frame: &Frame) -> Str
             within_s,
             ..
         }) => {
-            let is_above = if times_class_1 > 1.0 {
-                "ABOVE"
+            let chip_s = settings.sensor.frame_time(frame.exposure_time).as_s();
+            let frames_hz = 1.0 / settings.scene.lidar.frame_s(chip_s);
+            let judged = if times_class_1 > 1.0 {
+                format!("ABOVE class 1, {times_class_1:.2} times its limit")
             } else {
-                "within"
+                format!("class 1, {times_class_1:.2} of its limit")
             };
             format!(
-                "{is_above}, {times_class_1:.2} of the limit ({}; within {within_s:.2e} s)",
+                "{judged} ({}, within {within_s:.2e} s), at {frames_hz:.1} frames a second",
                 rule.name()
             )
         }

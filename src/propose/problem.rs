@@ -85,6 +85,7 @@ impl Problem {
         };
         scene.light.illuminance_klux = goal.illuminance_klux;
         scene.lidar.pulse_energy_uj = 1.0;
+        scene.lidar.frame_rate_hz = goal.fps;
         // Every macropixel looks at it at a right angle.
         let around = Shape::Sphere {
             centre_m: Default::default(),

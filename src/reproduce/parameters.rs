@@ -1,5 +1,6 @@
 //! The systems that the thesis reckons with, in its numbers: Table 6's and the demonstrator's (Table 15).
 
+use crate::scene::{Lidar, Scene};
 use crate::theory::detection::{Model, Ties};
 use crate::theory::partial::{Goal, Link, Models, System};
 use crate::theory::precision;
@@ -55,6 +56,9 @@ pub(super) fn demonstrator_light(klux: f64) -> f64 {
     4.8e6 * klux / 60.0
 }
 
+/// Illuminance at which Table 15 has its background of 8 Mcounts/s, klux.
+pub(super) const TABLE_15_KLUX: f64 = 100.0;
+
 /// The demonstrator (Table 15).
 pub(super) fn demonstrator() -> System {
     let link = Link {
@@ -71,4 +75,19 @@ pub(super) fn demonstrator() -> System {
         detection: EVERY_PHOTON,
     };
     System::new(link, goal, models, 8, 2.6e-9)
+}
+
+/// The demonstrator in the photons that come at its chip under an illuminance, those that SPADs would detect if they were always ready:
+/// more than Table 15's, which its chip counts.
+pub(super) fn demonstrator_photons(klux: f64) -> System {
+    const REFLECTIVITY: f64 = 0.1;
+    let scene = Scene {
+        lidar: Lidar::demonstrator(),
+        ..Scene::default()
+    };
+    let budget = scene.photon_budget(32, 64);
+    let mut system = demonstrator();
+    system.link.signal = budget.signal_per_pulse_far_field(1.0, REFLECTIVITY);
+    system.link.background_hz = budget.background_hz(REFLECTIVITY, klux);
+    system
 }

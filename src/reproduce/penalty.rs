@@ -5,7 +5,7 @@ use super::measured::partial::{
     AtRange, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip, with_interval,
 };
 use super::parameters::{
-    ROUNDED_LIGHT_M_PER_S, TABLE_6_BIN_M, demonstrator, long_range, sigma_over_fwhm,
+    ROUNDED_LIGHT_M_PER_S, TABLE_15_KLUX, TABLE_6_BIN_M, demonstrator, demonstrator_photons, long_range, sigma_over_fwhm,
 };
 use super::thesis::{ClaimText, claim};
 use crate::theory::detection::{Model, Ties};
@@ -164,6 +164,7 @@ fn delay_line_rows() -> Vec<Row> {
     let lines = demonstrator_on_delay_lines();
     let (sliding, penalty) = (lines.sliding(), lines.penalty_of_sliding());
     let guided = &lines.guided;
+    let photons = demonstrator_photons(TABLE_15_KLUX);
     vec![
         claim.measured("lines_sliding", &penalty).remark(format!(
             "{}: {} windows, of which each repeats 8.3 ns of the one before, where the thesis has none overlap; {} laser cycles over {}; {:.2} by the thesis's formula for these windows. Zooming needs bins of 20.8 and 166 ns, and elements of a delay line are 2.6 ns whatever CLK is: it is measured in CLK bins alone.",
@@ -171,7 +172,7 @@ fn delay_line_rows() -> Vec<Row> {
             lines.windows.len(),
             with_interval(&sliding, 0),
             with_interval(&guided.cycles, 0),
-            lines.reckoned / demonstrator().full(lines.range_m).laser_cycles(),
+            lines.reckoned / photons.full(lines.range_m).laser_cycles(),
         )),
         claim.row("lines_guided", guided.cycles.value).remark(format!(
             "{}; {} of {} frames of the reckoned number measure the echo within 0.5 m. Bins are calibrated.",

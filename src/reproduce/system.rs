@@ -3,7 +3,7 @@
 
 use super::claim::Row;
 use super::demonstrator::{self, swept};
-use super::parameters::{HSLIDAR_BIN_M, demonstrator, demonstrator_light};
+use super::parameters::{HSLIDAR_BIN_M, demonstrator_photons};
 use super::thesis::{chart, claim};
 use crate::chip::hslidar_delay_line;
 use crate::photon::Atmosphere;
@@ -27,8 +27,7 @@ fn metres(time_s: f64) -> f64 {
 
 /// Cramér-Rao bound of the range at `range_m` under `klux` after the demonstrator's exposure, m.
 fn bound_m(range_m: f64, klux: f64) -> f64 {
-    let mut system = demonstrator();
-    system.link.background_hz = demonstrator_light(klux);
+    let mut system = demonstrator_photons(klux);
     system.models.precision = cramer_rao;
     let one_frame = LASER_HZ * EXPOSURE_S;
     // The cycles that a millimetre takes tell what these many give.
@@ -81,10 +80,10 @@ pub(super) fn tracking_rows() -> Vec<Row> {
 
 /// P_D among the demonstrator's 8 bins, the signal times `factor`.
 fn detection_at(range_m: f64, klux: f64, factor: f64) -> f64 {
-    let system = demonstrator();
+    let system = demonstrator_photons(klux);
     let light = PerCycle {
         signal: factor * system.link.signal / (range_m * range_m),
-        background: demonstrator_light(klux) * system.bin_s,
+        background: system.link.background_hz * system.bin_s,
         bins: system.bins,
     };
     let cycles = (LASER_HZ * EXPOSURE_S) as u64;

@@ -127,7 +127,7 @@ pub(crate) fn variance_left_out_of(settings: &FrameSettings, frame: &Frame) -> O
     (is_by_cohort && probability > 0.0).then(|| variance_left_out(probability))
 }
 
-/// The laser beside class 1, for frame after frame: pulses come once a laser cycle, and none while a frame waits for its readout and load.
+/// The laser beside class 1, frame after frame: pulses come once a laser cycle, and none between exposures.
 pub(crate) fn eye_safety_of(
     sensor: &SensorConfig,
     scene: &Scene,
@@ -135,10 +135,11 @@ pub(crate) fn eye_safety_of(
     frame: &Frame,
 ) -> Option<EyeSafety> {
     let pulses = f64::from(laser_cycles);
+    let chip_s = sensor.frame_time(frame.exposure_time).as_s();
     let train = Train {
         rate_hz: pulses / frame.exposure_time.as_s(),
         pulses,
-        frame_s: sensor.frame_time(frame.exposure_time).as_s(),
+        frame_s: scene.lidar.frame_s(chip_s),
     };
     let emission = scene.emission(frame.rows as u32, frame.cols as u32, train);
     emission.beside_class_1()

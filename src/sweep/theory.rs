@@ -378,7 +378,7 @@ mod tests {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             wall.results(&mut Last::default())[at].number()
         };
-        let [short, usual, long] = [1.0, 2.0, 4.5].map(|fwhm_ns| of(fwhm_ns, 90.0, "p_detection"));
+        let [short, usual, long] = [1.0, 2.0, 4.5].map(|fwhm_ns| of(fwhm_ns, 200.0, "p_detection"));
         assert!(
             short > usual && usual > long,
             "{short:?} {usual:?} {long:?}"

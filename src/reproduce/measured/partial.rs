@@ -27,7 +27,7 @@ use crate::engine::EngineError;
 use crate::numerics::intervals::Estimate;
 use crate::report::Grid;
 use crate::reproduce::delay_line::calibrated as delay_line_calibration;
-use crate::reproduce::parameters::{demonstrator, long_range};
+use crate::reproduce::parameters::{TABLE_15_KLUX, demonstrator, demonstrator_photons, long_range};
 use crate::reproduce::thesis::measurement;
 use crate::theory::partial::System;
 
@@ -187,7 +187,7 @@ pub(crate) fn demonstrator_on_chip() -> &'static OnChip {
 fn measure_on_delay_lines(frames: usize) -> Result<OnDelayLines, EngineError> {
     let range_m = DEMONSTRATOR_RANGES_M[2];
     OnDelayLines::measure(
-        &demonstrator(),
+        &demonstrator_photons(TABLE_15_KLUX),
         delay_line_calibration(),
         range_m,
         frames / 2,
@@ -274,7 +274,7 @@ fn schemes(all: &[OnChip], lines: &OnDelayLines) -> Grid {
             }
         }
     }
-    let system = demonstrator();
+    let system = demonstrator_photons(TABLE_15_KLUX);
     let (name, range_m) = ("HSLIDAR, delay lines", lines.range_m);
     let full = system.full(range_m).laser_cycles();
     grid.push([

@@ -61,10 +61,12 @@ impl<'a> Drive<'a> {
             pipelined,
         } = self.settings.clock;
         let chip_s = self.chip_s().iter().sum::<f64>();
-        match pipelined {
-            true => guide_latency_s.max(chip_s),
-            false => guide_latency_s + chip_s,
-        }
+        let able_s = if pipelined {
+            guide_latency_s.max(chip_s)
+        } else {
+            guide_latency_s + chip_s
+        };
+        self.settings.frame.scene.lidar.frame_s(able_s)
     }
 
     /// What load, exposure and readout take, s.

@@ -166,7 +166,7 @@ mod tests {
         let found = bounced(&scene, 8);
         let photons: f64 = found.iter().map(|(photons, ..)| photons).sum::<f64>() / 64.0;
         let surface_m2 = 4.0 * std::f64::consts::PI * radius_m * radius_m;
-        let exposure_j_m2 = reflectivity * 20e-6 / surface_m2;
+        let exposure_j_m2 = reflectivity * scene.lidar.pulse_energy_uj * 1e-6 / surface_m2;
         let expected = scene
             .photon_budget(8, 8)
             .photons_of_exposure(reflectivity * exposure_j_m2);

@@ -70,9 +70,11 @@ keys! {
         laser_drift_nm_k: f64 ["nm/K"] = 0.08, in Within(-10.0, 10.0),
             from "thesis Table 4, a VCSEL";
         /// Energy of one laser pulse over the whole field of view.
-        pulse_energy_uj: f64 ["uJ"] = 20.0,
+        pulse_energy_uj: f64 ["uJ"] = 80.0,
             in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
-            from CHOSEN;
+            from "chosen: class 1 at 10 frames a second of 1000 pulses";
+        /// Most frames a second: the laser rests where the chip would be faster. 0 is as many as the chip takes.
+        frame_rate_hz: f64 ["Hz"] = 10.0, in Within(0.0, 1e6), from CHOSEN;
         /// Growth of a pulse's energy with temperature, as a share of pulse_energy_uj; negative for lasers at a fixed current.
         pulse_energy_drift_1_k: f64 ["1/K"] = 0.0, in Within(-0.1, 0.1),
             from "none in the thesis; Liao et al. 2016 (doi 10.4236/opj.2016.68B013), a diode of 940 nm";
@@ -105,7 +107,7 @@ keys! {
         /// Longest random wait before each laser pulse, against other lidars.
         dither_ns: f64 ["ns"] = 0.0, in Within(0.0, 1e9), from "none";
         /// Width of the laser's apparent source, for the safety of eyes; 0 is a point, the worst.
-        laser_source_mm: f64 ["mm"] = 0.0, in Within(0.0, 1000.0), from "chosen: unknown";
+        laser_source_mm: f64 ["mm"] = 12.0, in Within(0.0, 1000.0), from "chosen: an array of VCSELs behind a diffuser";
         /// Photon detection efficiency of the SPADs at the laser's wavelength.
         pde: f64 = 0.185, in SHARE, from "thesis Table 6";
         /// Photon detection efficiency over wavelength, for sunlight.
@@ -118,7 +120,7 @@ keys! {
         /// Standard deviation of a SPAD's detection efficiency, relative to the mean; window takes some 12 times as long with it.
         pde_spread: f64 = 0.0, in Within(0.0, 1.0), from "none in the thesis";
         /// Diameter of the lens aperture.
-        lens_diameter_mm: f64 ["mm"] = 4.0, in Above(0.0, f64::MAX), from CHOSEN;
+        lens_diameter_mm: f64 ["mm"] = 6.0, in Above(0.0, f64::MAX), from CHOSEN;
         /// Focal length over diameter of the lens.
         lens_f_number: f64 = 2.2, in Above(0.0, f64::MAX), from CHOSEN;
         /// Share of the light that lens and filter let through.
@@ -198,26 +200,38 @@ keys! {
 }
 
 impl Lidar {
+    /// From the beginning of a frame to that of the next one, s, if the chip could begin it after `chip_s`.
+    pub fn frame_s(&self, chip_s: f64) -> f64 {
+        if self.frame_rate_hz > 0.0 {
+            chip_s.max(1.0 / self.frame_rate_hz)
+        } else {
+            chip_s
+        }
+    }
+
     /// The optics of the thesis's demonstrator, before HSLIDAR's 64×32 macropixels (4.9, 6.3.1, Table 14).
     ///
     /// Published: macropixels of 114 µm × 54 µm, 25 mm focal length, 940 nm with a pulse of 4.5 ns, a filter of 10 nm, 3.5 % PDE, and
-    /// what a target of 10 % gives: 89 z⁻² counts a pulse, 4.8 Mcounts/s at 60 klux (Fig. 94). Aperture, transmittance and the
-    /// laser's energy are not. An aperture of f/1.4 is chosen, and the transmittance (which also stands for a PDE that is lower at 940 nm
-    /// than at 850 nm) is what gives the background; only their product counts. The energy, 0.68 µJ, is what then gives the signal,
+    /// what its chip counts before a target of 10 %: 89 z⁻² a pulse, 4.8 Mcounts/s at 60 klux (Fig. 94). SPADs that are dead and photons
+    /// that cancel are not counted; with them, 129.9 z⁻² and 4.876 Mcounts/s arrive. Aperture, transmittance and the laser's energy
+    /// are not published. An aperture of f/1.4 is chosen, and the transmittance (which also stands for a PDE that is lower at 940 nm
+    /// than at 850 nm) is what gives the background; only their product counts. The energy, 0.98 µJ, is what then gives the signal,
     /// whatever the aperture.
     pub fn demonstrator() -> Self {
         Lidar {
             fov_deg: 16.604,
             macropixel_aspect: 54.0 / 114.0,
             wavelength_nm: 940.0,
-            pulse_energy_uj: 0.6838,
+            pulse_energy_uj: 0.9822,
             pulse_fwhm_ns: 4.5,
             pde: 0.035,
             lens_diameter_mm: 25.0 / 1.4,
             lens_f_number: 1.4,
-            transmittance: 0.2019,
+            transmittance: 0.2051,
             solar_irradiance_w_m2: 3.047,
             dark_count_hz: 0.0,
+            frame_rate_hz: 0.0,
+            laser_source_mm: 0.0,
             spot: Spot::Rectangle,
             convention: Convention::Lambertian,
             ..Lidar::default()

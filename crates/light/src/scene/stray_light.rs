@@ -237,6 +237,7 @@ mod tests {
     /// A white board that fills the middle macropixel of 33 × 33, 30 m ahead in the dark, so many times as bright as if it were no mirror.
     fn sign(lidar: &str, retro: f64) -> Scene {
         let mut scene = Scene::parse("test", &format!("[lidar]\n{lidar}\n")).unwrap();
+        (scene.lidar.pulse_energy_uj, scene.lidar.lens_diameter_mm) = (20.0, 4.0);
         let side_m = 30.0 * 2.0 * 8f64.to_radians().tan() / 33.0;
         let shape = Shape::Plane {
             centre_m: DVec3::new(0.0, 0.0, 30.0),

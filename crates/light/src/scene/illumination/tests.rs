@@ -53,7 +53,7 @@ fn an_echo_that_is_cut_off_leaves_the_others_their_light() {
         sign.shape = sign.shape.shifted(DVec3::new(0.0, 0.0, -20.0));
         sign.retro = retro;
         scene.objects.push(sign);
-        scene.lidar.pulse_energy_uj = 4.0;
+        (scene.lidar.pulse_energy_uj, scene.lidar.lens_diameter_mm) = (4.0, 4.0);
         let light = light(&scene);
         let echoes = light.segments().flat_map(|segment| segment.echoes());
         echoes.map(|echo| echo.photons).collect()

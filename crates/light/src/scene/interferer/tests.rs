@@ -10,9 +10,10 @@ fn other(keys: &str) -> Interferer {
     Scene::parse("test", &text).unwrap().interferers.remove(0)
 }
 
-/// The street's optics before a wall of this reflectivity, 40 m ahead, with another lidar.
+/// A laser and a lens before a wall of this reflectivity, 40 m ahead, with another lidar.
 fn before_a_wall(reflectivity: f64, keys: &str) -> Scene {
     let mut scene = Scene::outdoor();
+    (scene.lidar.pulse_energy_uj, scene.lidar.lens_diameter_mm) = (20.0, 4.0);
     let shape = Shape::Plane {
         centre_m: DVec3::new(0.0, 0.0, 40.0),
         normal: DVec3::NEG_Z,
