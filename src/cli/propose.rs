@@ -143,8 +143,8 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     tell(sentences(&problem, &found, &corners))?;
     let (laser, design) = (1e2 * proposed.times_class_1, &proposed.design);
     tell(format_args!(
-        "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows at {} frames a second\n\
-         (`gdtof frame` judges frames without a pause); one of its macropixels, simulated gate by gate, counts as the window engine in {cycles} laser cycles.\n\
+        "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows at {} frames a second.\n\
+         One of its macropixels, simulated gate by gate, counts as the window engine in {cycles} laser cycles.\n\
          In {out}: designs.csv front.svg front.csv sensor.toml scene.toml {MANIFEST}\n\n  \
          gdtof frame --sensor {out}/sensor.toml --scene {out}/scene.toml --stop-periods {} --laser-cycles {} --guide truth:sigma_m={}\n",
         goal.fps,

@@ -12,10 +12,14 @@ const LASER_CYCLE_FS: u64 = 1_354_166_667;
 fn probe(folder: &Path, extra: &[&str]) -> PathBuf {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/vectors/scenes/outdoor.toml");
     let scene = std::fs::read_to_string(scene).unwrap();
-    let dim = scene
-        .replace("illuminance_klux = 50.0", "illuminance_klux = 0.01")
-        .replace("pulse_energy_uj = 20.0", "pulse_energy_uj = 0.001");
-    assert_ne!(scene, dim);
+    let mut dim = scene;
+    for (from, to) in [
+        ("illuminance_klux = 50.0", "illuminance_klux = 0.01"),
+        ("pulse_energy_uj = 100.0", "pulse_energy_uj = 0.001"),
+    ] {
+        assert!(dim.contains(from), "{from}");
+        dim = dim.replace(from, to);
+    }
     std::fs::write(folder.join("dim.toml"), dim).unwrap();
     let out = folder.join(extra.join("_"));
     let run = Command::new(env!("CARGO_BIN_EXE_gdtof"))

@@ -24,6 +24,7 @@ mod cycle_agrees_with_gate;
 mod delay_lines_time_photons;
 mod echoes_do_not_vanish;
 mod impossible_light_is_refused;
+mod keys_hold_at_their_limits;
 mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;
 mod own_blocks_agree_with_built_in_ones;

@@ -48,7 +48,7 @@ fn computed(number: u32, what: &str) -> f64 {
 /// times.
 #[test]
 fn inputs_that_come_out_again_are_given_and_meet_no_claim() {
-    for (number, inputs) in [(2, 3), (20, 2), (21, 2), (27, 3)] {
+    for (number, inputs) in [(2, 3), (20, 2), (21, 4), (27, 3)] {
         let rows = rows_of(number);
         let given = rows.iter().filter(|r| r.verdict() == Verdict::Given);
         assert_eq!(given.count(), inputs, "claim {number}");
@@ -109,7 +109,7 @@ fn claims_that_looked_better_than_they_are_are_not_met() {
     assert_eq!(held.verdict() == Verdict::Agrees, held_as_published);
 
     let counted = row(21, "signal photons per pulse times z² that the chip counts");
-    assert_eq!(counted.verdict(), Verdict::Differs);
+    assert_eq!(counted.verdict(), Verdict::Given);
     assert_eq!(counted.published.range(), Some((88.5, 89.5)));
 
     let crossing = row(24, "the same of one who crosses");

@@ -105,8 +105,11 @@ class Waveform:
 def read_vcd(path: str | PathLike[str]) -> Waveform:
     """Reads a VCD file, such as the waveforms of probes and of :func:`replay`."""
     try:
-        with open(path, encoding="utf-8") as file:
+        # With or without a byte order mark.
+        with open(path, encoding="utf-8-sig") as file:
             return _read(file, str(path))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is no VCD file; give one") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path and its permissions") from error
 

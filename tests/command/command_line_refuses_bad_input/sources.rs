@@ -140,6 +140,17 @@ fn a_byte_order_mark_is_read_over_everywhere() {
             .status
             .success()
     );
+    mark("wall.obj", "v -9 -9 0\nv 9 -9 0\nv 0 9 0\nf 1 2 3\n");
+    // Four spaces are a number of single precision, 1.4e-19.
+    mark("wall.pfm", "Pf\n1 1\n-1\n    ");
+    for object in [
+        "kind = \"mesh\"\ncentre_m = [0, 0, 30]\nfile = \"wall.obj\"",
+        "kind = \"map\"\nfocal_px = 50\ndepth_file = \"wall.pfm\"",
+    ] {
+        mark("objects.toml", &format!("[[object]]\n{object}\n"));
+        let scene = gdtof(dir, &["scene", "--scene", "objects.toml"]);
+        assert!(scene.status.success(), "{scene:?}");
+    }
     mark("captures.json", "[]");
     let captures = [
         "range",

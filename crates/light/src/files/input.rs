@@ -7,7 +7,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -21,7 +21,20 @@ use femtogate::InputError;
 const MEBIBYTE: usize = 1 << 20;
 
 /// What a byte order mark is in UTF-8.
-pub(crate) const MARK: &[u8] = "\u{feff}".as_bytes();
+const MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// Reads over a byte order mark at the beginning of a file.
+pub(crate) fn skip_mark(reader: &mut impl BufRead) -> io::Result<()> {
+    if reader.fill_buf()?.starts_with(MARK) {
+        reader.consume(MARK.len());
+    }
+    Ok(())
+}
+
+/// `bytes` without a byte order mark at their beginning.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(MARK).unwrap_or(bytes)
+}
 
 /// An opened file, and whether its end is known.
 fn open(path: &Path) -> Result<(File, bool), InputError> {
@@ -92,11 +105,7 @@ pub fn read_text_within(path: &Path, most_bytes: usize) -> Result<String, InputE
             checked += 1;
         }
     }
-    let start = if bytes.starts_with(MARK) {
-        MARK.len()
-    } else {
-        0
-    };
+    let start = bytes.len() - without_mark(&bytes).len();
     bytes.drain(..start);
     String::from_utf8(bytes).map_err(|_| {
         let message = "ends within a character; give a whole text file, saved as UTF-8";
@@ -167,8 +176,8 @@ impl<R: BufRead> Lines<R> {
             }
             self.number += 1;
             let is_first = self.number == 1;
-            let start = if is_first && self.bytes.starts_with(MARK) {
-                MARK.len()
+            let start = if is_first {
+                self.bytes.len() - without_mark(&self.bytes).len()
             } else {
                 0
             };

@@ -9,6 +9,7 @@ use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 use super::guarded::open_input;
+use super::input::skip_mark;
 use super::npy::{NpyHead, Number};
 use femtogate::InputError;
 
@@ -101,6 +102,7 @@ impl Raster {
         }
         let length = about.len();
         let mut reader = BufReader::new(file);
+        skip_mark(&mut reader).map_err(unreadable)?;
         let first = reader.fill_buf().map_err(unreadable)?;
         let read = match first {
             [0x89, b'P', b'N', b'G', ..] => read_png(reader, length),

@@ -70,7 +70,7 @@ keys! {
         laser_drift_nm_k: f64 ["nm/K"] = 0.08, in Within(-10.0, 10.0),
             from "thesis Table 4, a VCSEL";
         /// Energy of one laser pulse over the whole field of view.
-        pulse_energy_uj: f64 ["uJ"] = 80.0,
+        pulse_energy_uj: f64 ["uJ"] = 100.0,
             in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
             from "chosen: class 1 at 10 frames a second of 1000 pulses";
         /// Most frames a second: the laser rests where the chip would be faster. 0 is as many as the chip takes.
@@ -120,7 +120,7 @@ keys! {
         /// Standard deviation of a SPAD's detection efficiency, relative to the mean; window takes some 12 times as long with it.
         pde_spread: f64 = 0.0, in Within(0.0, 1.0), from "none in the thesis";
         /// Diameter of the lens aperture.
-        lens_diameter_mm: f64 ["mm"] = 6.0, in Above(0.0, f64::MAX), from CHOSEN;
+        lens_diameter_mm: f64 ["mm"] = 4.0, in Above(0.0, f64::MAX), from CHOSEN;
         /// Focal length over diameter of the lens.
         lens_f_number: f64 = 2.2, in Above(0.0, f64::MAX), from CHOSEN;
         /// Share of the light that lens and filter let through.
@@ -244,10 +244,12 @@ keys! {
     #[derive(Copy)]
     pub struct Stereo {
         /// Distance from the principal (left) to the right camera.
-        baseline_m: f64 ["m"] = 1.0, in LENGTH, from TABLE_12;
+        baseline_m: f64 ["m"] = 1.0,
+            in Limited(1e-6, 20.0, "the cameras of one rig stand closer; calibrations in mm have 1000 times as much"),
+            from TABLE_12;
         /// Distance from the principal to a third camera, between the two, that is like them: for what the pair has no estimate of. 0 is
         /// none.
-        third_camera_baseline_m: f64 ["m"] = 0.0, in Within(0.0, 1e6), from "none in Table 12; thesis 7.3.1 proposes one";
+        third_camera_baseline_m: f64 ["m"] = 0.0, in Within(0.0, 20.0), from "none in Table 12; thesis 7.3.1 proposes one";
         /// Focal length of both lenses.
         focal_mm: f64 ["mm"] = 12.0, in Above(0.0, f64::MAX), from TABLE_12;
         /// Pixel pitch of both cameras.

@@ -28,9 +28,9 @@ fn the_built_in_scene_is_valid() {
 fn bad_numbers_are_refused_with_their_line() {
     for (old, new) in [
         ("fov_deg = 16.0", "fov_deg = nan"),
-        ("pulse_energy_uj = 80.0", "pulse_energy_uj = -80.0"),
+        ("pulse_energy_uj = 100.0", "pulse_energy_uj = -100.0"),
         ("pde = 0.185", "pde = 1.5"),
-        ("lens_diameter_mm = 6.0", "lens_diameter_mm = 0.0"),
+        ("lens_diameter_mm = 4.0", "lens_diameter_mm = 0.0"),
         ("illuminance_klux = 50.0", "illuminance_klux = inf"),
         ("reflectivity = 0.15", "reflectivity = 1.15"),
         ("radius_m = 0.12", "radius_m = 0"),

@@ -19,7 +19,7 @@ use obvhs::aabb::Aabb;
 use self::tree::{Bounds, Tree};
 use super::meeting::{Meeting, NEAREST_M};
 use super::solid;
-use crate::files::{InputError, MARK, open_input};
+use crate::files::{InputError, open_input, skip_mark};
 use crate::scene::vector::Ray;
 
 mod tree;
@@ -129,9 +129,7 @@ impl Mesh {
             inner: BufReader::new(file),
             lines: 0,
         };
-        if reader.fill_buf().map_err(unreadable)?.starts_with(MARK) {
-            reader.consume(MARK.len());
-        }
+        skip_mark(&mut reader).map_err(unreadable)?;
         let options = tobj::LoadOptions {
             triangulate: false,
             ignore_points: true,
