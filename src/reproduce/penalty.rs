@@ -5,7 +5,8 @@ use super::measured::partial::{
     AtRange, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip, with_interval,
 };
 use super::parameters::{
-    ROUNDED_LIGHT_M_PER_S, TABLE_15_KLUX, TABLE_6_BIN_M, demonstrator, demonstrator_photons, long_range, sigma_over_fwhm,
+    ROUNDED_LIGHT_M_PER_S, TABLE_6_BIN_M, TABLE_15_KLUX, demonstrator, demonstrator_photons,
+    long_range, sigma_over_fwhm,
 };
 use super::thesis::{ClaimText, claim};
 use crate::theory::detection::{Model, Ties};

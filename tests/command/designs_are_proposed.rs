@@ -115,7 +115,10 @@ fn what_cannot_be_is_refused_in_a_sentence() {
         // Far enough that the sun decides, and a source that is allowed little.
         let words = more.replace(from, to);
         let words = match to {
-            "--klux 150" => words.replace("--range 20", "--range 150 --set scene.lidar.laser_source_mm=0"),
+            "--klux 150" => words.replace(
+                "--range 20",
+                "--range 150 --set scene.lidar.laser_source_mm=0",
+            ),
             _ => words,
         };
         let words: Vec<&str> = words.split(' ').collect();

@@ -9,7 +9,10 @@ use guided_dtof::scene::Scene;
 use guided_dtof::settings::{Key, Range, Settings};
 use guided_dtof::system::{EngineKind, Frame, WindowPolicy, take_frame};
 
+/// Macropixels of the four look at a quarter of a degree each, as the street's do.
 const SCENE: &str = r#"
+[lidar]
+fov_deg = 0.5
 [[object]]
 name = "road"
 kind = "ground"
@@ -30,7 +33,9 @@ const LASER_CYCLES: u32 = 10;
 
 /// Keys, each with the beginning of its assignment; what sizes the array is left out, as its ends only take time.
 fn keys() -> Vec<(String, Key)> {
-    let sensor = SensorConfig::KEYS.iter().map(|key| ("sensor".to_owned(), *key));
+    let sensor = SensorConfig::KEYS
+        .iter()
+        .map(|key| ("sensor".to_owned(), *key));
     let scene = Scene::SECTIONS.iter().flat_map(|section| {
         let place = match section.name {
             "object" => "scene.object.thing".to_owned(),
@@ -50,9 +55,10 @@ fn keys() -> Vec<(String, Key)> {
 fn values(range: Range) -> (Vec<f64>, Vec<f64>) {
     let beyond = |most: f64| most + 1.0 + 1e-3 * most.abs();
     match range {
-        Range::Within(least, most) | Range::Limited(least, most, _) => {
-            (vec![least, most], vec![-beyond(-least), beyond(most), f64::NAN])
-        }
+        Range::Within(least, most) | Range::Limited(least, most, _) => (
+            vec![least, most],
+            vec![-beyond(-least), beyond(most), f64::NAN],
+        ),
         Range::Above(below, most) => {
             let least = below + f64::max(1e-9, 1e-12 * below.abs());
             (vec![least, most], vec![below, beyond(most), f64::INFINITY])
@@ -61,8 +67,42 @@ fn values(range: Range) -> (Vec<f64>, Vec<f64>) {
     }
 }
 
-/// A frame of four macropixels with such a key: `Err` has what a user reads, and whether the input is at fault.
-fn frame(scene: &std::path::Path, set: &str, engine: EngineKind) -> Result<Frame, (String, bool)> {
+/// As files have it: whole numbers without a point.
+fn written(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 {
+        format!("{value:.0}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+/// A frame of four macropixels with such a key, in a list where the key is one: `Err` has what a user reads, and whether the input is at fault.
+fn frame(
+    scene: &std::path::Path,
+    key: &str,
+    value: f64,
+    engine: EngineKind,
+) -> Result<Frame, (String, bool)> {
+    let value = written(value);
+    let shapes = [1, 2, 3].map(|numbers| vec![value.clone(); numbers].join(", "));
+    let [one, two, three] = &shapes;
+    let mut frames = [one.clone(), format!("[{two}]"), format!("[{three}]")]
+        .into_iter()
+        .map(|value| frame_with(scene, &format!("{key}={value}"), engine));
+    let first = frames.next().expect("three");
+    match &first {
+        Err((says, _)) if says.contains("give a list") => {
+            frames.find(Result::is_ok).unwrap_or(first)
+        }
+        _ => first,
+    }
+}
+
+fn frame_with(
+    scene: &std::path::Path,
+    set: &str,
+    engine: EngineKind,
+) -> Result<Frame, (String, bool)> {
     let sources = Sources {
         scene: Some(scene.into()),
         rows: Some(2),
@@ -82,9 +122,16 @@ fn frame(scene: &std::path::Path, set: &str, engine: EngineKind) -> Result<Frame
 /// Numbers that a frame may have.
 fn assert_sound(frame: &Frame, set: &str) {
     let counts = frame.histograms.iter();
-    assert!(counts.clone().all(|&n| u32::from(n) <= LASER_CYCLES), "{set}");
+    assert!(
+        counts.clone().all(|&n| u32::from(n) <= LASER_CYCLES),
+        "{set}"
+    );
     for pixel in &frame.pixels {
-        assert_eq!(pixel.measured_m.is_some(), pixel.no_depth.is_none(), "{set}");
+        assert_eq!(
+            pixel.measured_m.is_some(),
+            pixel.no_depth.is_none(),
+            "{set}"
+        );
         for metres in [pixel.measured_m, pixel.bound_m].into_iter().flatten() {
             assert!(metres.is_finite() && metres >= 0.0, "{set}: {pixel:?}");
         }
@@ -100,31 +147,30 @@ fn every_number_at_and_beyond_the_ends_of_its_range() {
     for (key, about) in keys() {
         let (inside, outside) = values(about.range);
         for value in inside {
-            let set = format!("{key}={value:e}");
+            let set = format!("{key}={value}");
             for engine in [EngineKind::Window, EngineKind::Cohort] {
-                let began = std::time::Instant::now();
-                match frame(&scene, &set, engine) {
+                match frame(&scene, &key, value, engine) {
                     Ok(frame) => {
                         assert_sound(&frame, &set);
                         taken += 1;
                     }
                     Err((says, is_bad_input)) => {
-                        println!("{set}: {says}");
-                        assert!(is_bad_input, "{set}: {says}");
+                        assert!(is_bad_input && says.len() < 500, "{set}: {says}");
                         refused += 1;
                     }
                 }
-                println!("{set} {engine:?} {:?}", began.elapsed());
             }
         }
-        for value in outside.into_iter().filter(|v| v.abs() < 1e300 || v.is_nan()) {
-            let set = format!("{key}={value:e}");
-            let Err((says, is_bad_input)) = frame(&scene, &set, EngineKind::Window) else {
+        for value in outside
+            .into_iter()
+            .filter(|v| v.abs() < 1e300 || v.is_nan())
+        {
+            let set = format!("{key}={value}");
+            let Err((says, is_bad_input)) = frame(&scene, &key, value, EngineKind::Window) else {
                 panic!("{set} was taken");
             };
             assert!(is_bad_input && says.contains(about.name), "{set}: {says}");
         }
     }
-    println!("{taken} {refused}");
     assert!(taken > 400 && refused < taken, "{taken} {refused}");
 }

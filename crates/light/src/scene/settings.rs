@@ -12,7 +12,7 @@ use super::medium::Medium;
 use super::object::Object;
 use super::rig::Rig;
 use super::words::{
-    BeamWord, CHOSEN, FilterWord, LENGTH, POSITION, PdeWord, PulseWord, SHARE, StrayWord, TABLE_12,
+    BeamWord, CHOSEN, FilterWord, POSITION, PdeWord, PulseWord, SHARE, StrayWord, TABLE_12,
     VignettingWord,
 };
 use crate::photon::{Convention, Spot};
@@ -120,9 +120,9 @@ keys! {
         /// Standard deviation of a SPAD's detection efficiency, relative to the mean; window takes some 12 times as long with it.
         pde_spread: f64 = 0.0, in Within(0.0, 1.0), from "none in the thesis";
         /// Diameter of the lens aperture.
-        lens_diameter_mm: f64 ["mm"] = 4.0, in Above(0.0, f64::MAX), from CHOSEN;
+        lens_diameter_mm: f64 ["mm"] = 4.0, in Above(0.0, 1e5), from CHOSEN;
         /// Focal length over diameter of the lens.
-        lens_f_number: f64 = 2.2, in Above(0.0, f64::MAX), from CHOSEN;
+        lens_f_number: f64 = 2.2, in Above(0.0, 1e4), from CHOSEN;
         /// Share of the light that lens and filter let through.
         transmittance: f64 = 1.0, in SHARE, from "thesis Eq. 15, where it is left out";
         /// Illumination off the axis by an evenly bright scene.
@@ -251,27 +251,27 @@ keys! {
         /// none.
         third_camera_baseline_m: f64 ["m"] = 0.0, in Within(0.0, 20.0), from "none in Table 12; thesis 7.3.1 proposes one";
         /// Focal length of both lenses.
-        focal_mm: f64 ["mm"] = 12.0, in Above(0.0, f64::MAX), from TABLE_12;
+        focal_mm: f64 ["mm"] = 12.0, in Above(0.0, 1e5), from TABLE_12;
         /// Pixel pitch of both cameras.
-        pixel_pitch_um: f64 ["um"] = 3.45, in Above(0.0, f64::MAX), from TABLE_12;
+        pixel_pitch_um: f64 ["um"] = 3.45, in Above(0.0, 1e5), from TABLE_12;
         /// Columns of an image.
         width: u32 ["px"] = 1440, in Within(1.0, 16_384.0), from TABLE_12;
         /// Rows of an image.
         height: u32 ["px"] = 1080, in Within(1.0, 16_384.0), from TABLE_12;
         /// Standard deviation of the matched disparity.
-        disparity_sigma_px: f64 ["px"] = 1.0 / 3.0, in Within(0.0, f64::MAX),
+        disparity_sigma_px: f64 ["px"] = 1.0 / 3.0, in Within(0.0, 1e5),
             from "thesis Fig. 68, where 1/3 px is overlaid";
         /// Disparities are multiples of one over this many pixels.
         subpixel_steps: u32 = 16, in Within(1.0, 65_536.0),
             from "chosen: what semi-global matching gives";
         /// Smallest disparity accepted.
-        min_disparity_px: f64 ["px"] = 10.0, in Above(0.0, f64::MAX),
+        min_disparity_px: f64 ["px"] = 10.0, in Above(0.0, 1e5),
             from "thesis 5.2.1, an error below 10 % for a whole pixel";
         /// Largest disparity searched.
         ///
         /// 5.2.1 speaks of 128 px as customary, but at 1 m and 12 mm that would end the view at 27 m, while the rig is reported to see
         /// down to about 15 m. 232 px is the disparity at 15 m.
-        max_disparity_px: f64 ["px"] = 232.0, in Above(0.0, f64::MAX),
+        max_disparity_px: f64 ["px"] = 232.0, in Above(0.0, 1e5),
             from "chosen: the disparity at 15 m, where the thesis's rig begins to see";
         /// Place of the principal camera, [right, down, forward] of the lidar.
         position_m: DVec3 ["m"] = DVec3::ZERO, in POSITION, from CHOSEN;

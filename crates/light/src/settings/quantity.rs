@@ -3,7 +3,7 @@
 use crate::files::nearest;
 
 /// What units measure, in words for complaints: symbols, each with its power of ten of the base unit.
-const UNITS: [(&str, &[(&str, i32)]); 20] = [
+const UNITS: [(&str, &[(&str, i32)]); 21] = [
     (
         "a time",
         &[
@@ -51,6 +51,7 @@ const UNITS: [(&str, &[(&str, i32)]); 20] = [
     ),
     ("the energy of a carrier", &[("eV", 0), ("meV", -3)]),
     ("a voltage", &[("V", 0), ("mV", -3)]),
+    ("a share per kelvin", &[("1/K", 0), ("%/K", -2)]),
     ("a voltage per kelvin", &[("mV/K", -3)]),
     ("a length per kelvin", &[("nm/K", -9), ("pm/K", -12)]),
     ("a temperature", &[("C", 0), ("degC", 0), ("°C", 0)]),
