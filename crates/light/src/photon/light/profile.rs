@@ -1,5 +1,7 @@
 //! Background that depends on the time in the laser cycle, for example what fog sends back.
 
+use std::ops::Range;
+
 use super::error::{LightError, is_amount};
 use crate::units::Time;
 
@@ -17,7 +19,7 @@ impl Profile {
     /// Mean rate `rates_hz[i]` of detected photons from `edges[i]` until `edges[i + 1]` after the start of the laser cycle,
     /// and none before the first edge and after the last one; what would come after the cycle is left out.
     ///
-    /// Photons are drawn at the greatest rate and thinned, so a profile costs as much as its greatest rate all the time.
+    /// Photons are drawn at the greatest rate and thinned: that of a block of time in bright light, that of the profile otherwise.
     ///
     /// # Errors
     /// Another number of edges than one more than there are rates, no rate at all, edges that do not rise or are negative,
@@ -47,6 +49,22 @@ impl Profile {
         let piece = self.edges_fs.partition_point(|&edge_fs| edge_fs <= time_fs);
         let rate = piece.checked_sub(1).and_then(|i| self.rates_hz.get(i));
         rate.copied().unwrap_or(0.0)
+    }
+
+    /// The greatest rate within a time after the start of the laser cycle, photons per second.
+    pub(crate) fn greatest_within_hz(&self, within_fs: &Range<i64>) -> f64 {
+        let next = self
+            .edges_fs
+            .partition_point(|&edge_fs| edge_fs <= within_fs.start);
+        let pieces = self
+            .edges_fs
+            .iter()
+            .zip(&self.rates_hz)
+            .skip(next.saturating_sub(1));
+        pieces
+            .take_while(|&(&begins_fs, _)| begins_fs < within_fs.end)
+            .map(|(_, &rate_hz)| rate_hz)
+            .fold(0.0, f64::max)
     }
 
     /// Mean number of photons from one time until another one, femtoseconds after the start of the laser cycle.

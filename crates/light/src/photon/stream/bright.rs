@@ -141,9 +141,9 @@ fn add_gaps(
 const FARTHEST: f64 = (1u64 << 50) as f64;
 
 impl<'a> PixelStream<'a> {
-    /// Mean number of background photons of a SPAD in a dead time.
-    pub fn per_dead_time(&self) -> f64 {
-        self.stream.config.spads.dead_time.as_fs() as f64
+    /// Mean number of background photons of a SPAD in a dead time, within a time after the start of a laser cycle: the greatest.
+    pub fn per_dead_time(&self, within_fs: &Range<i64>) -> f64 {
+        self.greatest_share(within_fs) * self.stream.config.spads.dead_time.as_fs() as f64
             / (self.gap_fs * self.stream.spads() as f64)
     }
 
@@ -226,6 +226,11 @@ impl<'a> PixelStream<'a> {
             return;
         }
         let block_fs = self.block_fs(block);
+        let share = self.greatest_share(&block_fs);
+        if share == 0.0 {
+            return;
+        }
+        let gap_fs = self.gap_fs / share;
         let length = (block_fs.end - block_fs.start) as f64;
         let start = self.stream.cycle_start(cycle);
         let mut at = 0.0;
@@ -233,7 +238,7 @@ impl<'a> PixelStream<'a> {
             let second = chunk_word(block, chunk);
             let counter = [cycle, second, self.pixel, self.kind.bright_background()];
             for word in rand_philox::philox4x32_10(counter, self.key) {
-                at += gap_in_means(word) * self.gap_fs;
+                at += gap_in_means(word) * gap_fs;
                 if at >= length {
                     return;
                 }
@@ -244,7 +249,7 @@ impl<'a> PixelStream<'a> {
                 );
                 let is_kept = self.limits.is_none() || {
                     let words = [word, second.rotate_left(16) ^ cycle];
-                    self.keeps_background(cycle, spad, time_fs, words)
+                    self.keeps_background(cycle, spad, time_fs, share, words)
                 };
                 if time >= Time::ZERO && is_kept {
                     photons.push(Photon::new(time, spad, self.kind == Kind::Breeding));

@@ -147,7 +147,7 @@ impl Draw {
                     let cycle = first_cycle + cycle;
                     let is_before_exposure = cycle == 0 && time_fs < 0;
                     if !is_before_exposure
-                        && pixel.keeps_background(cycle, spad, time_fs, [word, run.slot])
+                        && pixel.keeps_background(cycle, spad, time_fs, 1.0, [word, run.slot])
                     {
                         kept.push((place, time_fs));
                     }

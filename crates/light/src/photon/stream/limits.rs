@@ -80,6 +80,23 @@ impl Limits {
         (least + (greatest - least) * rand_philox::u32_to_unit_f64(word)) / greatest
     }
 
+    /// The greatest rate of background within a time after the start of a laser cycle, as a share of the layer's. Before the start are the end of the cycle
+    /// before, and what follows that.
+    pub(super) fn greatest_share(&self, within_fs: &Range<i64>, cycle_fs: i64) -> f64 {
+        let Some(profile) = &self.profile else {
+            return 1.0;
+        };
+        // Starts of cycles are rounded.
+        let ends_fs = within_fs.start + cycle_fs - 2..within_fs.end.min(0) + cycle_fs + 2;
+        let before_hz = if within_fs.start < 0 {
+            profile.greatest_within_hz(&ends_fs)
+        } else {
+            0.0
+        };
+        let own_hz = profile.greatest_within_hz(&(within_fs.start.max(0)..within_fs.end));
+        own_hz.max(before_hz) / profile.greatest_hz
+    }
+
     /// The chance of a photon of this SPAD.
     pub(super) fn chance(&self, spad: u8) -> f64 {
         match &self.by_spad {

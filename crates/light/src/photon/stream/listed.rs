@@ -39,6 +39,9 @@ impl ListedEchoes {
         }
         let lane = cycle as usize % TILE;
         let first_cycle = cycle - lane as u32;
+        if !light.has_echo_in(&(first_cycle..first_cycle + TILE as u32)) {
+            return &[];
+        }
         if self.first_cycle != Some(first_cycle) {
             self.draw(light, first_cycle);
             self.first_cycle = Some(first_cycle);

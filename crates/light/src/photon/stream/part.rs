@@ -342,13 +342,47 @@ impl PixelStream<'_> {
         limits.is_none_or(|limits| limits.drawn().contains(&cycle))
     }
 
+    /// Whether photons may come within a time after the start of a laser cycle, whichever it is.
+    pub fn is_lit_within(&self, within_fs: &Range<i64>) -> bool {
+        let has_background = self.gap_fs.is_finite() && self.greatest_share(within_fs) > 0.0;
+        has_background || !self.echoes_within(within_fs).is_empty()
+    }
+
+    /// Whether some of these laser cycles may have background photons that are kept.
+    pub fn has_background_in(&self, cycles: &Range<u32>) -> bool {
+        let drawn = match &self.limits {
+            Some(limits) => limits.drawn(),
+            None => 0..u32::MAX,
+        };
+        let overlap = drawn.start.max(cycles.start)..drawn.end.min(cycles.end);
+        self.gap_fs.is_finite() && !overlap.is_empty()
+    }
+
+    /// Whether photons of the echoes of some of these laser cycles may be kept.
+    pub fn has_echo_in(&self, cycles: &Range<u32>) -> bool {
+        let sent = match &self.limits {
+            Some(limits) => limits.cycles.clone(),
+            None => 0..u32::MAX,
+        };
+        let overlap = sent.start.max(cycles.start)..sent.end.min(cycles.end);
+        !overlap.is_empty()
+    }
+
     /// Whether photons of the echo of a laser cycle may be kept.
     pub(super) fn sends_echo_in(&self, cycle: u32) -> bool {
         let limits = self.limits.as_ref();
         limits.is_none_or(|limits| limits.cycles.contains(&cycle))
     }
 
-    /// Whether a background photon is kept that comes `time_fs` after the start of its laser cycle. `words` are random ones
+    /// The greatest rate of background within a time after the start of a laser cycle, as a share of the layer's.
+    pub(super) fn greatest_share(&self, within_fs: &Range<i64>) -> f64 {
+        let limits = self.limits.as_ref();
+        limits.map_or(1.0, |limits| {
+            limits.greatest_share(within_fs, self.stream.cycle_fs)
+        })
+    }
+
+    /// Whether a background photon is kept that comes `time_fs` after the start of its laser cycle and was drawn at `share` of the layer's rate. `words` are random ones
     /// that no other photon has, unless it comes at the same time on the same SPAD.
     #[inline(never)]
     pub(super) fn keeps_background(
@@ -356,6 +390,7 @@ impl PixelStream<'_> {
         cycle: u32,
         spad: u8,
         time_fs: i64,
+        share: f64,
         words: [u32; 2],
     ) -> bool {
         let Some(limits) = &self.limits else {
@@ -371,7 +406,7 @@ impl PixelStream<'_> {
                 Some(before) if time_fs < 0 => (time - self.stream.cycle_start(before)).as_fs(),
                 _ => time_fs,
             };
-            chance *= profile.rate_hz(since_fs) / profile.greatest_hz;
+            chance *= profile.rate_hz(since_fs) / (share * profile.greatest_hz);
         }
         self.is_kept(chance, words)
     }

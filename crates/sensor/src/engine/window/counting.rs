@@ -14,6 +14,8 @@
 //! echoes of other cycles are seen ([`whole`]). Light with several layers, and bins that are not CLK periods, are sorted
 //! ([`sorted`]).
 
+use smallvec::SmallVec;
+
 use super::binning::{Binning, Scratch, Wanted};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
@@ -162,6 +164,10 @@ struct Pixel<'p> {
     echo: Option<EchoRows>,
     hits: Vec<i64>,
     work: Work,
+    /// In bright light: how long before a window its photons are drawn from at first.
+    look_back: Time,
+    /// And the parts of the light that may have photons there.
+    near: SmallVec<[usize; 8]>,
 }
 
 impl<'a> Counting<'a> {
@@ -233,6 +239,8 @@ impl<'a> Counting<'a> {
                 .flatten(),
             hits: self.engine.law.empty_hits(&sight.window),
             work: Work::default(),
+            look_back: Time::ZERO,
+            near: SmallVec::new(),
         };
         self.plain.carried.clear();
         self.past.clear();

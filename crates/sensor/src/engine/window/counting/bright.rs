@@ -3,6 +3,9 @@
 //! Each window begins some blocks of photons before its first bin, with SPADs of which nothing is known. Where that was
 //! not enough to know them in the window, it begins anew twice as far back.
 
+use smallvec::SmallVec;
+
+use super::super::sight::ROUNDING_FS;
 use super::{BREEDING, Counting, Pixel, Placed};
 use crate::photon::{ListedEchoes, Photon, PhotonStream, PixelStream, TILE};
 use crate::units::Time;
@@ -58,6 +61,8 @@ impl Counting<'_> {
         self.listed
             .resize_with(pixel.parts.len(), ListedEchoes::default);
         self.listed.iter_mut().for_each(ListedEchoes::clear);
+        pixel.look_back = self.first_look_back(pixel);
+        pixel.near = self.parts_near(pixel);
         let layout = self.layout(pixel);
         let alone = layout
             .as_ref()
@@ -72,10 +77,23 @@ impl Counting<'_> {
         }
     }
 
+    /// Parts of the light that may have photons where windows are drawn at first: in fog most echoes are those of its first metres.
+    fn parts_near(&self, pixel: &Pixel<'_>) -> SmallVec<[usize; 8]> {
+        let all = 0..pixel.parts.len();
+        let last_cycle = self.stream.config().laser_cycles.saturating_sub(1);
+        let Some(begin) = self.beginning(pixel, last_cycle) else {
+            return all.collect();
+        };
+        let begins_fs = begin.begins_fs(self.stream, pixel.light, last_cycle) - ROUNDING_FS;
+        let within_fs = begins_fs..pixel.sight.until_fs + ROUNDING_FS;
+        all.filter(|&part| pixel.parts[part].is_lit_within(&within_fs))
+            .collect()
+    }
+
     /// Where photons of the window of a laser cycle are drawn from at first; `None` if that is the whole exposure.
     pub(super) fn beginning(&self, pixel: &Pixel<'_>, laser_cycle: u32) -> Option<Beginning> {
         let window = self.window(pixel.sight, laser_cycle);
-        let from = window.wanted_from() - self.first_look_back(pixel);
+        let from = window.wanted_from() - pixel.look_back;
         let begin = self.beginning_before(pixel, from, &window);
         begin.time.is_some().then_some(begin)
     }
@@ -86,7 +104,10 @@ impl Counting<'_> {
     fn first_look_back(&self, pixel: &Pixel<'_>) -> Time {
         let dead_time = self.stream.config().spads.dead_time;
         let plain = pixel.parts.iter().filter(|part| !part.breeds());
-        let photons: f64 = plain.map(PixelStream::per_dead_time).sum();
+        // As long as the first look back into light without an end.
+        let before_fs = 10 * dead_time.as_fs();
+        let within_fs = pixel.sight.first_fs - before_fs..pixel.sight.until_fs;
+        let photons: f64 = plain.map(|part| part.per_dead_time(&within_fs)).sum();
         let dead_times = dead_time * (2 + (8.0 * photons) as i64);
         dead_times.max(self.stream.config().clock.period())
     }
@@ -95,13 +116,16 @@ impl Counting<'_> {
     pub(super) fn count_bright_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
         let window = self.window(pixel.sight, laser_cycle);
         let (wanted_from, until) = (window.wanted_from(), window.until());
-        let mut back = self.first_look_back(pixel);
+        let mut back = pixel.look_back;
+        let near = std::mem::take(&mut pixel.near);
         let drawn = loop {
             let begin = self.beginning_before(pixel, wanted_from - back, &window);
             self.photons.clear();
             let parts = pixel.parts;
-            let of_kind =
-                |breeds: bool| (0..parts.len()).filter(move |&n| parts[n].breeds() == breeds);
+            let is_drawn = |part: usize| back > pixel.look_back || near.contains(&part);
+            let of_kind = |breeds: bool| {
+                (0..parts.len()).filter(move |&n| parts[n].breeds() == breeds && is_drawn(n))
+            };
             for part in of_kind(true) {
                 self.push_breeding(pixel, part, begin, &window);
             }
@@ -133,6 +157,7 @@ impl Counting<'_> {
             }
             back = back * 2;
         };
+        pixel.near = near;
         pixel.work.photons_drawn += drawn;
         let seen = self.photons.iter();
         let seen = seen.filter(|photon| window.is_seen(photon.time)).count();
@@ -243,6 +268,10 @@ impl Counting<'_> {
         let begins = |cycle, block| {
             self.stream.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start)
         };
+        // Of light that changes from laser cycle to laser cycle most layers are dark.
+        if !light.has_background_in(&(cycle..window.laser_cycle + 2)) {
+            cycle = laser_cycles;
+        }
         while cycle < laser_cycles && begins(cycle, block) < until {
             light.push_block(cycle, block, &mut self.photons);
             block += 1;
