@@ -160,7 +160,6 @@ def test_copies_travel() -> None:
         (lambda: gdtof.frame(laser_cycles=-1), "laser_cycles: -1 is impossible; give a whole number, 0 to 4294967295"),
         (lambda: gdtof.frame(stop_periods=2.5), "stop_periods: 2.5 is impossible; give a whole number, 0 to 4294967295"),  # type: ignore[arg-type]
         (lambda: gdtof.frame(stop_periods=520.0), "stop_periods: 520.0 is impossible; give 520, without a point"),  # type: ignore[arg-type]
-        (lambda: gdtof.frame(sub_bins=2.5), "sub_bins: 2.5 is impossible; give a whole number, 0 to 255"),  # type: ignore[arg-type]
         (lambda: gdtof.frame(skip=1), "skip: 1 is impossible; give true or false"),  # type: ignore[arg-type]
         (lambda: gdtof.frame(seed=2**64), "18446744073709551616 is too large; give 64-bit numbers"),
         (lambda: gdtof.drive(segments=2.5), "segments: 2.5 is impossible; give a whole number, 0 to 4294967295"),  # type: ignore[arg-type]

@@ -49,11 +49,8 @@ pub(super) struct FrameArgs {
     /// Format of the waveforms of probes.
     #[arg(long, value_enum, default_value_t)]
     wave_format: WaveFormatOption,
-    /// Gone, and refused: the cohort engine chooses its steps itself.
-    #[arg(long, value_name = "K", hide = true)]
-    sub_bins: Option<u8>,
     /// Run every macropixel on the cheapest engine that adds at most M metres of depth error on average.
-    #[arg(long, value_name = "M", conflicts_with_all = ["engine", "sub_bins", "no_skip"])]
+    #[arg(long, value_name = "M", conflicts_with_all = ["engine", "no_skip"])]
     tolerance: Option<f64>,
     /// Draw and run everything, even what the engine could leave out: same histograms, more work.
     #[arg(long)]
@@ -161,7 +158,6 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
 impl FrameArgs {
     fn request(&self) -> FrameRequest {
         FrameRequest {
-            sub_bins: self.sub_bins,
             tolerance_m: self.tolerance,
             skip: !self.no_skip,
             false_alarm_rate: self.false_alarm_rate,

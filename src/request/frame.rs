@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Spelling, guided_exposure};
 use crate::chip::{Sensor, SensorConfig, Tdc};
 use crate::engine::CohortOptions;
-use crate::files::{InputError, read_text};
+use crate::files::{InputError, parse_json, read_text};
 use crate::guide::{BehaviouralStereo, Guide, GuideInput, options};
 use crate::ranging::{BinProfile, DepthOptions};
 use crate::scene::Scene;
@@ -26,8 +26,6 @@ keys! {
         seed: u64 = 1, in Within(0.0, f64::MAX);
         /// Engine of the macropixels.
         engine: EngineKind = EngineKind::default();
-        /// Gone, and refused: the cohort engine chooses its steps itself.
-        sub_bins: Option<u8> = None, in Within(1.0, 64.0);
         /// Depth error that a cheaper engine may add on average; one engine takes all macropixels, if left out.
         tolerance_m: Option<f64> ["m"] = None, in Within(0.0, f64::MAX);
         /// Leave out what the engine can do without, for the same histograms.
@@ -115,10 +113,6 @@ impl FrameRequest {
         }
         let rate = self.false_alarm_rate;
         check_false_alarm_rate(rate, self.spelling)?;
-        if self.sub_bins.is_some() {
-            let message = "is gone: the cohort engine chooses its steps itself; leave it out, and use the window engine where cohort refuses";
-            return Err(wrong("sub_bins", message.into()));
-        }
         let calibration = match &self.calibration {
             Some(path) => Some(read_calibration(path, &sensor)?),
             None => None,
@@ -219,11 +213,8 @@ pub fn check_drive_times(
 /// # Errors
 /// A file that is none, and another sensor's.
 pub fn read_calibration(path: &Path, sensor: &SensorConfig) -> Result<BinProfile, InputError> {
-    let text = read_text(path)?;
-    let profile: BinProfile = serde_json::from_str(&text).map_err(|error| {
-        let message = format!("this is not a bin profile ({error}); make one with gdtof calibrate");
-        InputError::at(path.display(), error.line(), message)
-    })?;
+    let wanted = "a bin profile, as gdtof calibrate makes it";
+    let profile: BinProfile = parse_json(path.display(), &read_text(path)?, wanted)?;
     let is_whole = profile.macropixels.len() == profile.sensor.pixels()
         && profile.macropixels.iter().flatten().all(|line| {
             let lengths = [line.middle_s.len(), line.length_s.len()];
@@ -261,7 +252,6 @@ mod tests {
     #[test]
     fn defaults_are_within_their_ranges_and_read_back() {
         let all = FrameRequest {
-            sub_bins: Some(4),
             tolerance_m: Some(0.01),
             calibration: Some("calibration.json".into()),
             ..FrameRequest::default()

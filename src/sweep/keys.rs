@@ -94,10 +94,7 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
         ("frame", _, Kind::Frame) => match among(FrameRequest::KEYS) {
             None => return none(all(FrameRequest::KEYS)),
             found => {
-                let all = FrameRequest {
-                    sub_bins: Some(1),
-                    ..FrameRequest::default()
-                };
+                let all = FrameRequest::default();
                 (found, Table::try_from(all).expect("numbers and words"))
             }
         },

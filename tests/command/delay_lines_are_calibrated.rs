@@ -107,7 +107,7 @@ fn what_cannot_be_calibrated_is_refused() {
         ),
         (
             "frame --sensor hslidar_delay_line --stop-periods 140 --calibration text.json",
-            "text.json:1: this is not a bin profile",
+            "text.json:1: this is no JSON; give a bin profile",
         ),
         (
             "frame --sensor hslidar_delay_line --stop-periods 140 --engine cycle",

@@ -199,7 +199,6 @@ def frame(
     laser_cycles: int = 1000,
     seed: int = 1,
     engine: Engine = "window",
-    sub_bins: int | None = None,
     tolerance_m: float | None = None,
     skip: bool = True,
     false_alarm_rate: float = 1e-3,
@@ -237,8 +236,6 @@ def frame(
         Seed of photons and guide errors.
     engine
         Engine of the macropixels: gate, cycle, window or cohort.
-    sub_bins
-        Gone, and refused: the cohort engine chooses its steps itself.
     tolerance_m
         Depth error that a cheaper engine may add on average, m.
     skip
@@ -279,7 +276,6 @@ def frame(
         "laser_cycles": laser_cycles,
         "seed": seed,
         "engine": engine,
-        "sub_bins": sub_bins,
         "tolerance_m": tolerance_m,
         "skip": skip,
         "false_alarm_rate": float(false_alarm_rate),

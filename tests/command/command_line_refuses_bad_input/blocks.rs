@@ -117,7 +117,7 @@ fn netlists_are_refused_with_file_and_cure() {
         ),
         (
             "p_counter=no.json",
-            "--block p_counter=no.json: no.json: is no netlist of Yosys (expected value at line 1 column 1); write one with: yosys -p",
+            "--block p_counter=no.json: no.json: is no netlist of Yosys (line 1: it is no JSON); write one with: yosys -p",
         ),
         (
             "p_counter=none.json",

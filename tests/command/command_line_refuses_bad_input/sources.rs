@@ -147,7 +147,10 @@ fn a_byte_order_mark_is_read_over_everywhere() {
         "kind = \"mesh\"\ncentre_m = [0, 0, 30]\nfile = \"wall.obj\"",
         "kind = \"map\"\nfocal_px = 50\ndepth_file = \"wall.pfm\"",
     ] {
-        mark("objects.toml", &format!("[[object]]\n{object}\n"));
+        mark(
+            "objects.toml",
+            &format!("[[object]]\nname = \"wall\"\n{object}\n"),
+        );
         let scene = gdtof(dir, &["scene", "--scene", "objects.toml"]);
         assert!(scene.status.success(), "{scene:?}");
     }

@@ -84,3 +84,19 @@ pub enum YosysError {
     #[error(transparent)]
     Netlist(#[from] NetlistError),
 }
+
+/// What a reader of JSON says, without Rust's words.
+pub(super) fn in_words(error: &serde_json::Error) -> String {
+    let said = error.to_string();
+    let missing = said.strip_prefix("missing field `");
+    let what = if error.is_eof() {
+        "the text ends early".to_owned()
+    } else if let Some((name, _)) = missing.and_then(|rest| rest.split_once('`')) {
+        format!("`{name}` is missing")
+    } else if error.is_data() {
+        "an entry is of another kind than a netlist has there".to_owned()
+    } else {
+        "it is no JSON".to_owned()
+    };
+    format!("line {}: {what}", error.line())
+}

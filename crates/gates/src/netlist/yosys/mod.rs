@@ -29,6 +29,7 @@ use super::module::{Module, Net};
 use super::{CellKind, ModuleBuilder};
 use cells::{FlipFlop, Placing};
 pub use error::YosysError;
+use error::in_words;
 
 /// Most bytes of a file: a macropixel has 1.2 MB, a block a tenth of that.
 const MOST_BYTES: usize = 16 << 20;
@@ -142,7 +143,7 @@ impl Module {
             return Err(YosysError::TooLong(text.len()));
         }
         let design: Design =
-            serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(e.to_string()))?;
+            serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(in_words(&e)))?;
         let mut modules = design.modules.0;
         let cells = modules.iter_mut().flat_map(|(_, of)| &mut of.cells.0);
         for (_, cell) in cells {
