@@ -149,7 +149,7 @@ fn a_byte_order_mark_is_read_over_everywhere() {
     ] {
         mark(
             "objects.toml",
-            &format!("[[object]]\nname = \"wall\"\n{object}\n"),
+            &format!("[[object]]\nname = \"wall\"\nreflectivity = 0.5\n{object}\n"),
         );
         let scene = gdtof(dir, &["scene", "--scene", "objects.toml"]);
         assert!(scene.status.success(), "{scene:?}");
