@@ -33,6 +33,42 @@ fn commands(text: &str) -> String {
     commands
 }
 
+/// Counts of `replay` and laser cycles of `wave` below a folder in which nothing is counted: they show a reader nothing.
+fn nothing_counted(folder: &Path) -> Vec<PathBuf> {
+    let (mut empty, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() {
+                folders.push(path);
+            } else if name.ends_with(".csv") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let mut lines = text.lines();
+                let is_counts = lines.next() == Some("row,col,bin,count");
+                if is_counts && lines.all(|line| line.ends_with(",0")) {
+                    empty.push(path);
+                }
+            } else if name.starts_with("wave_") && name.ends_with(".vcd") && !has_hit(&path) {
+                empty.push(path);
+            }
+        }
+    }
+    empty
+}
+
+/// Whether a bit of HIT rises in a waveform.
+fn has_hit(path: &Path) -> bool {
+    let mut waves = wellen::simple::read(path).unwrap();
+    let hierarchy = waves.hierarchy();
+    let mut vars = hierarchy.all_vars().map(|var| &hierarchy[var]);
+    let hit = vars.find(|var| var.full_name(hierarchy).ends_with("metdc.HIT"));
+    let signal = hit.expect("a macropixel has a HIT").signal_ref();
+    waves.load_signals(&[signal]);
+    let mut changes = waves.get_signal(signal).unwrap().iter_changes();
+    changes.any(|(_, value)| value.to_bit_string().unwrap().contains('1'))
+}
+
 #[test]
 #[cfg(unix)]
 fn every_command_runs() {
@@ -59,7 +95,11 @@ fn every_command_runs() {
                 .output()
                 .unwrap();
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            (!output.status.success()).then(|| format!("{chapter}: {said}"))
+            if !output.status.success() {
+                return Some(format!("{chapter}: {said}"));
+            }
+            let empty_ones = nothing_counted(empty.path());
+            (!empty_ones.is_empty()).then(|| format!("{chapter}: nothing counts in {empty_ones:?}"))
         })
         .collect();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
