@@ -60,10 +60,12 @@ fn nothing_counted(folder: &Path) -> Vec<PathBuf> {
 /// Whether a bit of HIT rises in a waveform.
 fn has_hit(path: &Path) -> bool {
     let mut waves = wellen::simple::read(path).unwrap();
-    let hierarchy = waves.hierarchy();
-    let mut vars = hierarchy.all_vars().map(|var| &hierarchy[var]);
-    let hit = vars.find(|var| var.full_name(hierarchy).ends_with("metdc.HIT"));
-    let signal = hit.expect("a macropixel has a HIT").signal_ref();
+    let signal = {
+        let hierarchy = waves.hierarchy();
+        let mut vars = hierarchy.all_vars().map(|var| &hierarchy[var]);
+        let hit = vars.find(|var| var.full_name(hierarchy).ends_with("metdc.HIT"));
+        hit.expect("a macropixel has a HIT").signal_ref()
+    };
     waves.load_signals(&[signal]);
     let mut changes = waves.get_signal(signal).unwrap().iter_changes();
     changes.any(|(_, value)| value.to_bit_string().unwrap().contains('1'))

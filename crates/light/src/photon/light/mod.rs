@@ -291,6 +291,12 @@ impl PixelLight {
         signals.fold(0.0, f64::max) * self.greatest_factor()
     }
 
+    /// Mean photons a laser cycle of the brightest echo.
+    pub(in crate::photon) fn brightest_echo(&self) -> f64 {
+        let echoes = self.segments().flat_map(Segment::echoes);
+        echoes.map(|echo| echo.photons).fold(0.0, f64::max) * self.greatest_factor()
+    }
+
     /// Greatest mean rate of background photons and dark counts of all SPADs per second: that at which photons are drawn.
     /// Where SPADs differ, as if all were the greatest.
     pub fn background_hz(&self) -> f64 {

@@ -131,7 +131,8 @@ pub(super) fn sampler(shape: &PulseShape) -> Arc<PulseSampler> {
 /// Mcounts/s, 9.3 | 3.6 s at 400, on a busy machine; between them it is a guess.
 const BRIGHT_BACKGROUND_HZ: f64 = 160e6;
 
-/// The same for signal photons a laser cycle: 1.0 | 2.0 s at 5, 52 | 3.6 s at 60.
+/// The same for photons of an echo a laser cycle: 1.0 | 2.0 s at 5, 52 | 3.6 s at 60. Of several echoes the brightest counts: fog sends many back from
+/// its first metres, which no window sees.
 const BRIGHT_SIGNAL: f64 = 8.0;
 
 /// And where a SPAD is blind for more than this share of the time, so that its state before a window is often unknown: as
@@ -203,7 +204,7 @@ impl StreamConfig {
         let background_hz = light.background_hz();
         let blind = background_hz / self.spads.grid.spads() as f64 * self.spads.dead_time.as_s();
         background_hz > BRIGHT_BACKGROUND_HZ
-            || light.signal_per_cycle() > BRIGHT_SIGNAL
+            || light.brightest_echo() > BRIGHT_SIGNAL
             || blind > BRIGHT_BLIND_SHARE
     }
 }
