@@ -52,8 +52,8 @@ impl Demo {
         match self {
             Demo::Glass | Demo::Sweep => 9.0,
             Demo::Yaw | Demo::Speed | Demo::Limit | Demo::Corner => 13.0,
+            Demo::Fog => 18.0,
             Demo::Van | Demo::Night => 33.0,
-            Demo::Fog => 93.0,
             Demo::Sign => 600.0,
             Demo::Interference => 1700.0,
         }
