@@ -41,7 +41,8 @@ def test_what_cannot_be_says_why() -> None:
     design: dict[str, Any] = {"bins": 16, "clk_hz": 384e6, "pulse_energy_uj": 1.0, "rate_hz": 80e3, "guide_sigma_m": 0.3}
     hopeless = problem.judge(**{**design, "guide_sigma_m": 50})
     assert hopeless == {"possible": False, "limit": hopeless["limit"]} and "the guide" in hopeless["limit"]
-    bright = problem.judge(**{**design, "pulse_energy_uj": 10.0})
+    from_a_point = gdtof.Problem(scene=gdtof.Scene("street", {"lidar.laser_source_mm": 0}), **ASKED)
+    bright = from_a_point.judge(**{**design, "pulse_energy_uj": 10.0})
     assert not bright["possible"] and "class 1" in bright["limit"] and bright["excess"][0] > 0
     too_fast = problem.judge(**{**design, "clk_hz": 1e9, "bins": 64})
     assert not too_fast["possible"] and "slower than a CLK period" in too_fast["limit"], too_fast
