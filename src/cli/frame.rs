@@ -17,7 +17,9 @@ use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
 use crate::report::Table;
-use crate::request::{FrameReport, FrameRequest, eye_safety_of, variance_left_out_of, write_frame};
+use crate::request::{
+    FrameReport, FrameRequest, eye_safety_of, frame_s, variance_left_out_of, write_frame,
+};
 use crate::scene::EyeSafety;
 use crate::system::{Frame, FrameSettings, Probe, WindowPolicy, take_frame_by};
 use crate::units::Time;
@@ -370,8 +372,7 @@ fn eye_safety(settings: &FrameSettings, laser_cycles: u32, frame: &Frame) -> Str
             within_s,
             ..
         }) => {
-            let chip_s = settings.sensor.frame_time(frame.exposure_time).as_s();
-            let frames_hz = 1.0 / settings.scene.lidar.frame_s(chip_s);
+            let frames_hz = 1.0 / frame_s(&settings.sensor, &settings.scene, frame);
             let judged = if times_class_1 > 1.0 {
                 format!("ABOVE class 1, {times_class_1:.2} times its limit")
             } else {

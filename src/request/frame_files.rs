@@ -127,6 +127,12 @@ pub(crate) fn variance_left_out_of(settings: &FrameSettings, frame: &Frame) -> O
     (is_by_cohort && probability > 0.0).then(|| variance_left_out(probability))
 }
 
+/// From the beginning of a frame to that of the next one, s.
+pub(crate) fn frame_s(sensor: &SensorConfig, scene: &Scene, frame: &Frame) -> f64 {
+    let chip_s = sensor.frame_time(frame.exposure_time).as_s();
+    scene.lidar.frame_s(chip_s)
+}
+
 /// The laser beside class 1, frame after frame: pulses come once a laser cycle, and none between exposures.
 pub(crate) fn eye_safety_of(
     sensor: &SensorConfig,
@@ -135,11 +141,10 @@ pub(crate) fn eye_safety_of(
     frame: &Frame,
 ) -> Option<EyeSafety> {
     let pulses = f64::from(laser_cycles);
-    let chip_s = sensor.frame_time(frame.exposure_time).as_s();
     let train = Train {
         rate_hz: pulses / frame.exposure_time.as_s(),
         pulses,
-        frame_s: scene.lidar.frame_s(chip_s),
+        frame_s: frame_s(sensor, scene, frame),
     };
     let emission = scene.emission(frame.rows as u32, frame.cols as u32, train);
     emission.beside_class_1()

@@ -350,7 +350,7 @@ mod tests {
             hits.any(|hit| (measured_m - hit.range_m).abs() <= frame.bin_m)
         };
         let pixels = frame.pixels.iter().enumerate().filter(|(_, p)| p.in_window);
-        // A window that cuts off an echo sees its tail, of which no depth has a bound.
+        // Of a strong echo that is metres deep the first photons fill the bins: such a depth is early, and has no bound.
         let wrong: Vec<(usize, f64)> = pixels
             .filter(|(_, p)| p.bound_m.is_some())
             .filter_map(|(pixel, p)| Some((pixel, p.measured_m?)))

@@ -1,4 +1,4 @@
-//! Every key of sensor and scene at the ends of its range and beyond: a frame of sound numbers or a sentence, and nothing outside.
+//! Every number of sensor and scene at the ends of its range and beyond: a frame of sound numbers or a sentence at the ends, a sentence beyond.
 
 use std::sync::Arc;
 
@@ -61,7 +61,7 @@ fn values(range: Range) -> (Vec<f64>, Vec<f64>) {
         ),
         Range::Above(below, most) => {
             let least = below + f64::max(1e-9, 1e-12 * below.abs());
-            (vec![least, most], vec![below, beyond(most), f64::INFINITY])
+            (vec![least, most], vec![below, beyond(most), f64::NAN])
         }
         _ => (Vec::new(), Vec::new()),
     }

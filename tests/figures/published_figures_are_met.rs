@@ -111,6 +111,12 @@ fn claims_that_looked_better_than_they_are_are_not_met() {
     let counted = row(21, "signal photons per pulse times z² that the chip counts");
     assert_eq!(counted.verdict(), Verdict::Given);
     assert_eq!(counted.published.range(), Some((88.5, 89.5)));
+    // What is given is in the model.
+    for counted in [counted, row(21, "background that the chip counts")] {
+        let (low, high) = counted.published.range().unwrap();
+        let found = counted.computed.unwrap();
+        assert!((low..=high).contains(&found), "{}: {found}", counted.what);
+    }
 
     let crossing = row(24, "the same of one who crosses");
     let is_updated = crossing.computed.unwrap() >= 0.5;

@@ -19,16 +19,15 @@ use crate::cli::stereo::{Errors, TruthArgs, cannot_match, disparity_picture, rea
 use crate::files::{InputError, Raster, parse_toml};
 use crate::guide::{Guide, GuideInput, MatchedPair};
 use crate::report::{Table, write_npy_f32};
-use crate::scene::{DVec3, DepthMap, GroundTruth, MapFiles, Object, PinholeCamera, Scene, Shape};
+use crate::scene::{
+    DVec3, DepthMap, GroundTruth, MOST_BASELINE_M, MapFiles, Object, PinholeCamera, Scene, Shape,
+};
 use crate::settings::Document;
 use crate::stereo::{DisparityMap, Matcher};
 
 /// Standard deviation that is claimed for a disparity, px: half of all errors on the Motorcycle pair are below 0.15 px, as with 0.22 px, and tails are
 /// longer than a Gaussian's.
 const SIGMA_PX: f64 = 0.25;
-
-/// Longest baseline of a camera pair, m: chosen, ten times that of long ones on vehicles.
-const MOST_BASELINE_M: f64 = 20.0;
 
 const DEPTH_FILE: &str = "depth_map.npy";
 

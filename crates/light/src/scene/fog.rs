@@ -7,7 +7,7 @@
 //!           echoes    profile        near cells outshine the daylight and are echoes of their own width; the rest is background
 //! ```
 //!
-//! A profile is drawn at its greatest rate all the time and thinned, so that the glare of the first metres is not part of it.
+//! In dim light a profile is drawn at its greatest rate all the time and thinned, so that the glare of the first metres is not part of it.
 
 use super::settings::Scene;
 use crate::photon::{Echo, PhotonBudget, PixelLight, Profile};

@@ -45,7 +45,7 @@ keys! {
         /// How far upwards it looks.
         pitch_deg: f64 ["deg"] = 0.0, in Within(-90.0, 90.0);
         /// Full width of its beam.
-        beam_width_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: as the street's lidar";
+        beam_width_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: a fifth of the street's lidar";
         /// Full height of its beam.
         beam_height_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: as the street's lidar";
         /// Pulses per second.

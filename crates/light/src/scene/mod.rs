@@ -47,7 +47,7 @@ pub use interferer::Interferer;
 pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
 pub use object::Object;
 pub use rig::{Rig, RigWaypoint, Waypoint};
-pub use settings::{Lidar, Light, SKY_REFLECTIVITY, Scene, Stereo};
+pub use settings::{Lidar, Light, MOST_BASELINE_M, SKY_REFLECTIVITY, Scene, Stereo};
 pub use shape::{DepthMap, MapFiles, Mesh, Shape};
 pub use texture::{Pattern, Picture, Texture};
 pub use truth::{Before, GroundTruth};

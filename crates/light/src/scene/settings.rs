@@ -239,17 +239,20 @@ impl Lidar {
     }
 }
 
+/// Longest baseline of a camera pair, m: chosen, ten times that of long ones on vehicles.
+pub const MOST_BASELINE_M: f64 = 20.0;
+
 keys! {
     /// The stereo camera rig of thesis 5.2.2 (Table 12), whose values are the default of every field.
     #[derive(Copy)]
     pub struct Stereo {
         /// Distance from the principal (left) to the right camera.
         baseline_m: f64 ["m"] = 1.0,
-            in Limited(1e-6, 20.0, "the cameras of one rig stand closer; calibrations in mm have 1000 times as much"),
+            in Limited(1e-6, MOST_BASELINE_M, "the cameras of one rig stand closer; calibrations in mm have 1000 times as much"),
             from TABLE_12;
         /// Distance from the principal to a third camera, between the two, that is like them: for what the pair has no estimate of. 0 is
         /// none.
-        third_camera_baseline_m: f64 ["m"] = 0.0, in Within(0.0, 20.0), from "none in Table 12; thesis 7.3.1 proposes one";
+        third_camera_baseline_m: f64 ["m"] = 0.0, in Within(0.0, MOST_BASELINE_M), from "none in Table 12; thesis 7.3.1 proposes one";
         /// Focal length of both lenses.
         focal_mm: f64 ["mm"] = 12.0, in Above(0.0, 1e5), from TABLE_12;
         /// Pixel pitch of both cameras.

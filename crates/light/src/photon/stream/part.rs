@@ -70,6 +70,11 @@ pub struct PixelStream<'a> {
     pub(super) late_fs: i64,
 }
 
+/// Whether two ranges have something in common.
+fn meet(a: &Range<u32>, b: &Range<u32>) -> bool {
+    a.start.max(b.start) < a.end.min(b.end)
+}
+
 /// The parts of a macropixel's light. The first has the photons that trigger no others. Light of one echo has that
 /// part and one with those that do.
 pub type LightParts<'a> = SmallVec<[PixelStream<'a>; 2]>;
@@ -350,22 +355,14 @@ impl PixelStream<'_> {
 
     /// Whether some of these laser cycles may have background photons that are kept.
     pub fn has_background_in(&self, cycles: &Range<u32>) -> bool {
-        let drawn = match &self.limits {
-            Some(limits) => limits.drawn(),
-            None => 0..u32::MAX,
-        };
-        let overlap = drawn.start.max(cycles.start)..drawn.end.min(cycles.end);
-        self.gap_fs.is_finite() && !overlap.is_empty()
+        let limits = self.limits.as_ref();
+        self.gap_fs.is_finite() && limits.is_none_or(|limits| meet(&limits.drawn(), cycles))
     }
 
     /// Whether photons of the echoes of some of these laser cycles may be kept.
-    pub fn has_echo_in(&self, cycles: &Range<u32>) -> bool {
-        let sent = match &self.limits {
-            Some(limits) => limits.cycles.clone(),
-            None => 0..u32::MAX,
-        };
-        let overlap = sent.start.max(cycles.start)..sent.end.min(cycles.end);
-        !overlap.is_empty()
+    pub(super) fn has_echo_in(&self, cycles: &Range<u32>) -> bool {
+        let limits = self.limits.as_ref();
+        limits.is_none_or(|limits| meet(&limits.cycles, cycles))
     }
 
     /// Whether photons of the echo of a laser cycle may be kept.

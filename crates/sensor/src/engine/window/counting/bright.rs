@@ -104,7 +104,7 @@ impl Counting<'_> {
     fn first_look_back(&self, pixel: &Pixel<'_>) -> Time {
         let dead_time = self.stream.config().spads.dead_time;
         let plain = pixel.parts.iter().filter(|part| !part.breeds());
-        // As long as the first look back into light without an end.
+        // The rate near the window counts; ten dead times before it are near.
         let before_fs = 10 * dead_time.as_fs();
         let within_fs = pixel.sight.first_fs - before_fs..pixel.sight.until_fs;
         let photons: f64 = plain.map(|part| part.per_dead_time(&within_fs)).sum();
@@ -260,23 +260,18 @@ impl Counting<'_> {
     ) {
         let light = &pixel.parts[part];
         let (laser_cycles, until) = (self.stream.config().laser_cycles, window.until());
-        let Beginning {
-            mut cycle,
-            mut block,
-            ..
-        } = begin;
-        let begins = |cycle, block| {
-            self.stream.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start)
-        };
         // Of light that changes from laser cycle to laser cycle most layers are dark.
-        if !light.has_background_in(&(cycle..window.laser_cycle + 2)) {
-            cycle = laser_cycles;
-        }
-        while cycle < laser_cycles && begins(cycle, block) < until {
-            light.push_block(cycle, block, &mut self.photons);
-            block += 1;
-            if block == light.blocks() {
-                (cycle, block) = (cycle + 1, 0);
+        if light.has_background_in(&(begin.cycle..window.laser_cycle + 2)) {
+            let (mut cycle, mut block) = (begin.cycle, begin.block);
+            let begins = |cycle, block| {
+                self.stream.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start)
+            };
+            while cycle < laser_cycles && begins(cycle, block) < until {
+                light.push_block(cycle, block, &mut self.photons);
+                block += 1;
+                if block == light.blocks() {
+                    (cycle, block) = (cycle + 1, 0);
+                }
             }
         }
         let from = begin.time.unwrap_or(Time::ZERO);
