@@ -51,8 +51,7 @@ impl Demo {
     fn processor_s(self) -> f64 {
         match self {
             Demo::Glass | Demo::Sweep => 9.0,
-            Demo::Yaw | Demo::Speed | Demo::Limit | Demo::Corner => 13.0,
-            Demo::Fog => 18.0,
+            Demo::Fog | Demo::Yaw | Demo::Speed | Demo::Limit | Demo::Corner => 13.0,
             Demo::Van | Demo::Night => 33.0,
             Demo::Sign => 600.0,
             Demo::Interference => 1700.0,
