@@ -133,7 +133,7 @@ fn files_that_cannot_be_used_are_refused_with_line_and_cure() {
         ),
         (
             map("depth_file = \"grey.png\""),
-            "grey.png: is a PNG, whose whole numbers have no unit; give depth_unit_m (0.001 for millimetres",
+            "grey.png: has whole numbers, whose unit it does not say; give depth_unit_m (0.001 for millimetres",
         ),
         (
             map("depth_file = \"colour.png\"\ndepth_unit_m = 0.001"),

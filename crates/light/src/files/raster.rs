@@ -39,14 +39,14 @@ impl Raster {
     /// # Errors
     /// When it cannot be read, is none of the kinds, is broken, or has more than 2²⁶ pixels.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        Ok(Self::read_any(path)?.0)
+        Ok(Self::read_any(path)?.raster)
     }
 
     /// Reads a map of lengths or disparities; `unit` is what its numbers count, 1 if left out. There is no value where it has 0, NaN or infinity:
     /// these become 0.
     ///
     /// # Errors
-    /// As [`Raster::read`]; a picture in colour; a PNG without `unit`, which `unit_key` names; a negative number.
+    /// As [`Raster::read`]; a picture in colour; whole numbers without `unit`, which `unit_key` names; a negative number.
     pub fn read_map(path: &Path, unit: Option<f64>, unit_key: &str) -> Result<Self, InputError> {
         let mut raster = Self::read_numbers(path, unit, unit_key)?;
         for value in raster.values.iter_mut().filter(|value| !value.is_finite()) {
@@ -65,13 +65,17 @@ impl Raster {
         unit_key: &str,
     ) -> Result<Self, InputError> {
         let complain = |message: String| Err(InputError::new(path.display(), message));
-        let (mut raster, is_colour) = Self::read_any(path)?;
+        let Contents {
+            mut raster,
+            is_colour,
+            is_whole,
+        } = Self::read_any(path)?;
         if is_colour {
             return complain("is a picture in colour and no map; save it with one channel".into());
         }
-        if raster.white > 1.0 && unit.is_none() {
+        if is_whole && unit.is_none() {
             return complain(format!(
-                "is a PNG, whose whole numbers have no unit; give {unit_key}, or save it as .npy, PFM or EXR"
+                "has whole numbers, whose unit it does not say; give {unit_key}, or save it with floats as .npy, PFM or EXR"
             ));
         }
         raster.white = 1.0;
@@ -88,8 +92,7 @@ impl Raster {
         Ok(raster)
     }
 
-    /// What [`Raster::read`] does, and whether it is a picture in colour.
-    fn read_any(path: &Path) -> Result<(Self, bool), InputError> {
+    fn read_any(path: &Path) -> Result<Contents, InputError> {
         let complain = |message: String| InputError::new(path.display(), message);
         let unreadable = |e| InputError::unreadable(path, &e);
         let file = open_input(path)?;
@@ -106,9 +109,9 @@ impl Raster {
         let first = reader.fill_buf().map_err(unreadable)?;
         let read = match first {
             [0x89, b'P', b'N', b'G', ..] => read_png(reader, length),
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => read_npy(reader).map(without_colour),
-            [b'P', b'f' | b'F', ..] => read_pfm(reader).map(without_colour),
-            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader, length).map(without_colour),
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => read_npy(reader),
+            [b'P', b'f' | b'F', ..] => read_pfm(reader).map(floats),
+            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader, length),
             _ => Err("is not a PNG, .npy, PFM or EXR; convert it to one of them".into()),
         };
         read.map_err(complain)
@@ -120,8 +123,20 @@ impl Raster {
     }
 }
 
-fn without_colour(raster: Raster) -> (Raster, bool) {
-    (raster, false)
+/// What stands in a file.
+struct Contents {
+    raster: Raster,
+    is_colour: bool,
+    /// Whether its numbers are whole ones, which count units that the file does not name.
+    is_whole: bool,
+}
+
+fn floats(raster: Raster) -> Contents {
+    Contents {
+        raster,
+        is_colour: false,
+        is_whole: false,
+    }
 }
 
 /// Refuses what is too large to unpack.
@@ -151,8 +166,7 @@ fn broken(what: &str, error: impl std::fmt::Display) -> String {
     )
 }
 
-/// And whether it is in colour.
-fn read_png(reader: BufReader<File>, length: u64) -> Result<(Raster, bool), String> {
+fn read_png(reader: BufReader<File>, length: u64) -> Result<Contents, String> {
     let broken = |e: png::DecodingError| broken("PNG", e);
     let mut decoder = png::Decoder::new_with_limits(reader, png::Limits { bytes: 1 << 30 });
     decoder.set_ignore_text_chunk(true);
@@ -185,10 +199,14 @@ fn read_png(reader: BufReader<File>, length: u64) -> Result<(Raster, bool), Stri
         values: bytes.chunks_exact(pixel_bytes).map(grey).collect(),
         white: if wide { 65_535.0 } else { 255.0 },
     };
-    Ok((raster, channels >= 3))
+    Ok(Contents {
+        raster,
+        is_colour: channels >= 3,
+        is_whole: true,
+    })
 }
 
-fn read_npy(mut reader: BufReader<File>) -> Result<Raster, String> {
+fn read_npy(mut reader: BufReader<File>) -> Result<Contents, String> {
     let head = NpyHead::read(&mut reader).map_err(|e| broken("NumPy file", e))?;
     let [height, width] = head.shape[..] else {
         let shape = head.shape;
@@ -210,11 +228,15 @@ fn read_npy(mut reader: BufReader<File>) -> Result<Raster, String> {
         true => (at % width) * height + at / width,
         false => at,
     };
-    Ok(Raster {
-        width,
-        height,
-        values: (0..width * height).map(place).map(value).collect(),
-        white: 1.0,
+    Ok(Contents {
+        raster: Raster {
+            width,
+            height,
+            values: (0..width * height).map(place).map(value).collect(),
+            white: 1.0,
+        },
+        is_colour: false,
+        is_whole: matches!(numbers.first(), Some(Number::Whole(_))),
     })
 }
 
@@ -261,9 +283,17 @@ fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
 }
 
 /// The first layer's channel Z, or else V, Y or its only one, in the picture's display window: 0 where the layer has no pixels.
-fn read_exr(mut reader: BufReader<File>, length: u64) -> Result<Raster, String> {
+fn read_exr(mut reader: BufReader<File>, length: u64) -> Result<Contents, String> {
+    use exr::error::Error;
+    use exr::image::FlatSamples;
     use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
-    let told = |e: exr::error::Error| broken("EXR", e);
+    let told = |e: Error| match e {
+        Error::NotSupported(what) => format!(
+            "is an EXR of a kind that is not read ({what}); save it as scan lines or tiles of one full channel, packed as ZIP or PIZ"
+        ),
+        Error::Invalid(why) => broken("EXR", why.trim_start_matches("invalid: ")),
+        other => broken("EXR", other),
+    };
     let about = MetaData::read_from_buffered(&mut reader, false).map_err(told)?;
     if about.headers.is_empty() {
         return Err("has no layer; save it again".into());
@@ -322,11 +352,15 @@ fn read_exr(mut reader: BufReader<File>, length: u64) -> Result<Raster, String> 
             values[row * width + col] = value;
         }
     }
-    Ok(Raster {
-        width,
-        height,
-        values,
-        white: 1.0,
+    Ok(Contents {
+        raster: Raster {
+            width,
+            height,
+            values,
+            white: 1.0,
+        },
+        is_colour: false,
+        is_whole: matches!(channel.sample_data, FlatSamples::U32(_)),
     })
 }
 

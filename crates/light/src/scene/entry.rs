@@ -148,7 +148,7 @@ entry! {
     reflectivity_file: PathBuf;
     /// Of a map: what the cameras see, white is 1; the object's grey if left out.
     grey_file: PathBuf;
-    /// Of a map: unit of its depths, a metre if left out; a PNG needs it (0.001 for millimetres, 0.00390625 for KITTI's 1/256 m).
+    /// Of a map: unit of its depths, a metre if left out; whole numbers need it (0.001 for millimetres, 0.00390625 for KITTI's 1/256 m).
     depth_unit_m: f64 ["m"], in LENGTH;
     /// Of a map: whether depths are along the camera's axis or distances from it; axis if left out.
     depth_along: DepthKind;

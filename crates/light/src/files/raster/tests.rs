@@ -128,12 +128,12 @@ fn numbers_of_a_map_have_a_unit_and_a_sign() {
         map.map_err(|error| error.to_string())
     };
     let wide = png_of(2, 1, ColorType::Grayscale, BitDepth::Sixteen, &[1, 0, 0, 0]);
-    assert_eq!(map(&wide, Some(1.0 / 256.0)).unwrap().values, [1.0, 0.0]);
-    assert!(
-        map(&wide, None)
-            .unwrap_err()
-            .contains("no unit; give the_unit")
-    );
+    let whole = npy_of(&[2, 1], &[256u16, 0]);
+    for whole in [&wide, &whole] {
+        assert_eq!(map(whole, Some(1.0 / 256.0)).unwrap().values, [1.0, 0.0]);
+        let error = map(whole, None).unwrap_err();
+        assert!(error.contains("does not say; give the_unit"), "{error}");
+    }
     let colours = png_of(1, 1, ColorType::Rgb, BitDepth::Eight, &[200, 100, 50]);
     assert!(map(&colours, Some(1.0)).unwrap_err().contains("in colour"));
     let none = npy_of(&[1, 4], &[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 5.0]);

@@ -34,7 +34,7 @@ pub struct MapFiles {
     pub reflectivity: Option<PathBuf>,
     /// What cameras see, white is 1.
     pub grey: Option<PathBuf>,
-    /// Unit of depth, m; `None` for what is usual: a millimetre for whole numbers in a PNG, a metre for others.
+    /// Unit of depth, m; `None` for a metre, which only floats may leave out.
     pub unit_m: Option<f64>,
     /// Whether depths are distances from the camera; otherwise they are along its axis.
     pub is_range: bool,

@@ -16,12 +16,14 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use obvhs::aabb::Aabb;
 
+use self::listed::{CrossedFace, Listed};
 use self::tree::{Bounds, Tree};
 use super::meeting::{Meeting, NEAREST_M};
 use super::solid;
 use crate::files::{InputError, open_input, skip_mark};
 use crate::scene::vector::Ray;
 
+mod listed;
 mod tree;
 
 /// Most triangles of a mesh. With their tree they take about 160 bytes each.
@@ -48,14 +50,6 @@ pub struct Mesh {
     tree: Tree,
     middle: DVec3,
     size: DVec3,
-}
-
-/// The triangles of a file, as it lists them.
-#[derive(Default)]
-struct Listed {
-    corners: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
-    on_texture: Vec<[[f32; 2]; 3]>,
 }
 
 impl std::fmt::Debug for Mesh {
@@ -103,10 +97,10 @@ impl<R: BufRead> BufRead for Counted<R> {
 }
 
 impl Mesh {
-    /// Reads an OBJ file. Convex faces with more corners are cut into triangles; materials, lines and points are passed over.
+    /// Reads an OBJ file. Faces with more corners are cut into triangles; materials, lines and points are passed over.
     ///
     /// # Errors
-    /// When it cannot be read, is broken, has no triangles or more than four million, a concave face, or a corner that is no number.
+    /// When it cannot be read, is broken, has no triangles or more than four million, a face that crosses itself, or a corner that is no number.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let complain = |message: String| InputError::new(path.display(), message);
         let unreadable = |e| InputError::unreadable(path, &e);
@@ -143,9 +137,9 @@ impl Mesh {
             let message = format!("is a broken OBJ here ({e}); save it again, with its triangles");
             InputError::at(path.display(), lines.max(1), message)
         })?;
-        let listed = Listed::of_models(models).map_err(|ConcaveFace(at)| {
+        let listed = Listed::of_models(models).map_err(|CrossedFace(at)| {
             let message = format!(
-                "has a concave face with a corner at {at:?}, which triangles from its first corner would fill; cut its faces into triangles"
+                "has a face that crosses itself, with a corner at {at:?}; cut its faces into triangles"
             );
             complain(message)
         })?;
@@ -304,83 +298,6 @@ impl Mesh {
         };
         (mix(0), mix(1))
     }
-}
-
-/// A face that triangles from its first corner do not cover, by a corner of it as the file has it.
-#[derive(Debug)]
-struct ConcaveFace([f64; 3]);
-
-impl Listed {
-    fn of_models(models: Vec<tobj::Model>) -> Result<Self, ConcaveFace> {
-        let mut all = Listed::default();
-        let is_textured = (models.iter())
-            .all(|model| model.mesh.texcoord_indices.len() == model.mesh.indices.len());
-        for tobj::Model { mesh: read, .. } in models {
-            let first = all.corners.len() as u32;
-            let corners = read.positions.as_chunks::<3>().0;
-            all.corners
-                .extend(corners.iter().map(|[x, y, z]| [*x, -y, -z]));
-            let place = |index: u32| {
-                let at = 2 * index as usize;
-                // OBJ counts v upwards.
-                [read.texcoords[at], 1.0 - read.texcoords[at + 1]].map(|x| x as f32)
-            };
-            // Without a list of them all faces are triangles.
-            let triangles = read.indices.len() / 3;
-            let listed = read.face_arities.iter().map(|&n| n as usize);
-            let triangular = std::iter::repeat_n(3, triangles);
-            let is_listed = !read.face_arities.is_empty();
-            let mut begins = 0;
-            for corners_of_face in listed.chain(triangular.filter(|_| !is_listed)) {
-                let face = begins..begins + corners_of_face;
-                begins = face.end;
-                let indices = &read.indices[face.clone()];
-                let at = |index: u32| corners[index as usize];
-                if is_concave(indices.iter().map(|&index| at(index))) {
-                    return Err(ConcaveFace(at(indices[0])));
-                }
-                for third in 2..corners_of_face {
-                    let triangle = [0, third - 1, third];
-                    // What has no area is met by no ray; thousands in one place would be tried by every ray.
-                    if !has_area(triangle.map(|n| at(indices[n]))) {
-                        continue;
-                    }
-                    all.triangles.push(triangle.map(|n| indices[n] + first));
-                    if is_textured {
-                        let on_texture = &read.texcoord_indices[face.clone()];
-                        all.on_texture.push(triangle.map(|n| place(on_texture[n])));
-                    }
-                }
-            }
-        }
-        Ok(all)
-    }
-}
-
-/// Whether a triangle is more than a line.
-fn has_area(corners: [[f64; 3]; 3]) -> bool {
-    let [a, b, c] = corners.map(DVec3::from_array);
-    // Not a number is told as such later.
-    (b - a).cross(c - a) != DVec3::ZERO
-}
-
-/// Whether a polygon turns the other way at some corner. Its normal is Newell's.
-fn is_concave(corners: impl ExactSizeIterator<Item = [f64; 3]>) -> bool {
-    if corners.len() < 4 {
-        return false;
-    }
-    let corners: Vec<DVec3> = corners.map(DVec3::from_array).collect();
-    let from_first = |n: usize| corners[n % corners.len()] - corners[0];
-    let normal: DVec3 = (1..corners.len())
-        .map(|n| from_first(n).cross(from_first(n + 1)))
-        .sum();
-    let turn = |n: usize| {
-        let [a, b, c] = [n, n + 1, n + 2].map(from_first);
-        (b - a).cross(c - b).dot(normal)
-    };
-    // Files round corners, often to single precision.
-    let room = 1e-5 * normal.length_squared();
-    (0..corners.len()).any(|n| turn(n) < -room)
 }
 
 #[cfg(test)]

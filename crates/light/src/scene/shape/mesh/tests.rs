@@ -50,33 +50,65 @@ fn ball(rings: usize, radius: f64) -> String {
     obj_of(&corners, faces)
 }
 
-/// A ray through the notch of a U would meet triangles from the first corner of its face.
+/// A file of one face in the plane z = -5, whose outline is this.
+fn one_face(outline: &[[f64; 2]]) -> String {
+    let corners: Vec<[f64; 3]> = outline.iter().map(|&[x, y]| [x, y, -5.0]).collect();
+    obj_of(&corners, [(0..corners.len()).collect()])
+}
+
+/// Whether a point is inside a polygon: a line from it crosses the outline an odd number of times.
+fn is_within(outline: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+    let sides = outline.iter().zip(outline.iter().cycle().skip(1));
+    let crossed = sides.filter(|([ax, ay], [bx, by])| {
+        (*ay > y) != (*by > y) && x < ax + (bx - ax) * (y - ay) / (by - ay)
+    });
+    crossed.count() % 2 == 1
+}
+
 #[test]
-fn concave_faces_are_refused_and_convex_ones_cut() {
-    let u = [
-        [0, 0],
-        [3, 0],
-        [3, 3],
-        [2, 3],
-        [2, 1],
-        [1, 1],
-        [1, 3],
-        [0, 3],
+fn convex_faces_are_cut_from_their_first_corner() {
+    let hexagon = [
+        [1.0, 0.0],
+        [2.0, 0.0],
+        [3.0, 1.0],
+        [2.0, 2.0],
+        [1.0, 2.0],
+        [0.0, 1.0],
     ];
-    let hexagon = [[1, 0], [2, 0], [3, 1], [2, 2], [1, 2], [0, 1]];
-    let of = |outline: &[[i32; 2]]| {
-        let corners: Vec<[f64; 3]> = outline
-            .iter()
-            .map(|&[x, y]| [f64::from(x), f64::from(y), -5.0])
-            .collect();
-        obj_of(&corners, [(0..corners.len()).collect()])
-    };
-    let error = read(&of(&u)).unwrap_err().to_string();
-    assert!(error.contains("concave face"), "{error}");
-    assert_eq!(read(&of(&hexagon)).unwrap().triangles(), 4);
+    assert_eq!(read(&one_face(&hexagon)).unwrap().triangles(), 4);
     let mut backwards = hexagon;
     backwards.reverse();
-    assert_eq!(read(&of(&backwards)).unwrap().triangles(), 4);
+    assert_eq!(read(&one_face(&backwards)).unwrap().triangles(), 4);
+}
+
+#[test]
+fn a_face_that_crosses_itself_is_refused() {
+    let bow = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]];
+    let error = read(&one_face(&bow)).unwrap_err().to_string();
+    assert!(error.contains("crosses itself"), "{error}");
+}
+
+proptest! {
+    /// Stars, whose notches triangles from one corner would fill.
+    #[test]
+    fn concave_faces_hide_nothing_in_their_notches(
+        radii in prop::collection::vec(0.2f64..3.0, 4..14),
+        turn in 0.0f64..6.0,
+        at in prop::collection::vec((-3.0f64..3.0, -3.0f64..3.0), 60),
+    ) {
+        let outline: Vec<[f64; 2]> = (radii.iter().enumerate())
+            .map(|(n, radius)| {
+                let (y, x) = (turn + std::f64::consts::TAU * n as f64 / radii.len() as f64).sin_cos();
+                [radius * x, radius * y]
+            })
+            .collect();
+        let mesh = read(&one_face(&outline)).unwrap();
+        for (x, y) in at {
+            // The file's y is up.
+            let ray = Ray { origin: DVec3::new(x, -y, 0.0), direction: DVec3::Z };
+            prop_assert_eq!(mesh.meet(&ray).is_some(), is_within(&outline, [x, y]));
+        }
+    }
 }
 
 #[test]
