@@ -34,6 +34,9 @@ const MOST_STEPS: f64 = 96.0;
 /// Standard deviations from its centre where a pulse begins and ends: 10⁻¹¹ of it is left out, less than a photon of 10¹⁰.
 const PULSE_REACH: f64 = 6.7;
 
+/// Shortest pulse, bins: with one that takes no time, no place near the end of a bin explains a few counts in the next one.
+const LEAST_SIGMA: f64 = 0.02;
+
 /// Parameters of the light: place, ln signal, ln background, ln width.
 pub(super) const PARAMETERS: usize = 4;
 
@@ -89,7 +92,7 @@ impl Response {
         let neighbours = 2.0 * grid.neighbours() as f64 / (4 * grid.spads()) as f64;
         Response {
             bins: config.bins,
-            pulse_sigma_bins: pulse.sigma.as_s() / bin_s,
+            pulse_sigma_bins: (pulse.sigma.as_s() / bin_s).max(LEAST_SIGMA),
             tail: pulse.tail.map(|tail| Tail {
                 share: tail.share,
                 bins: tail.time.as_s() / bin_s,

@@ -103,9 +103,6 @@ const OF_SHAPE: f64 = 0.2;
 /// An echo is cut off where the window's first or last bin has more than this part of its peak: chosen.
 const MOST_AT_END: f64 = 0.5;
 
-/// Standard deviation of a pulse most of which lies within a bin, bins.
-const SHORT: f64 = 0.4;
-
 impl EchoFinder {
     /// For the bins of `law` and pulses of this width: a [`Time`](crate::units::Time) is the standard deviation of Gaussian ones.
     ///
@@ -367,20 +364,10 @@ impl EchoFinder {
     fn bound_bins(&self, corrected: &Corrected) -> f64 {
         let of_shape = OF_SHAPE * self.spread_bins(&corrected.light).unwrap_or(0.0);
         let bound = libm::hypot(corrected.bound_bins, of_shape);
-        bound.min(self.most_bound_bins(corrected))
-    }
-
-    /// What the bound of a significant peak is at most: its bin is known if a pulse is shorter than that, and the window otherwise.
-    /// Under a THRESHOLD other lights may explain the counts from anywhere.
-    fn most_bound_bins(&self, corrected: &Corrected) -> f64 {
-        let Some(Ok(WalkCorrection { response, .. })) = self.walk else {
-            return f64::INFINITY;
-        };
-        let is_in_a_bin = corrected.light.sigma_bins < SHORT && response.counting.threshold == 0;
-        if is_in_a_bin {
-            1.0
-        } else {
-            response.bins as f64
+        // Under a THRESHOLD other lights may explain the counts from anywhere.
+        match self.walk {
+            Some(Ok(walk)) => bound.min(walk.response.bins as f64),
+            _ => bound,
         }
     }
 

@@ -7,6 +7,7 @@ mod expected;
 mod finder;
 mod likelihood;
 mod peak;
+mod place;
 mod profile;
 mod returns;
 mod spad_state;

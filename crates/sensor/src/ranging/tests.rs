@@ -10,6 +10,8 @@ use crate::engine::{LitPixel, Window, expose, stream_config};
 use crate::photon::{DiffusionTail, EchoWidth, PhotonStream, PixelLight, PulseShape, StreamConfig};
 use crate::units::{Time, TimeOfFlight};
 
+mod short_pulses;
+
 const PULSE_SIGMA: Time = Time::from_ps(1_911);
 
 /// A pulse of which three photons in ten are late by more than a bin.

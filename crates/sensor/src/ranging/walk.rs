@@ -18,38 +18,27 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::expected::{EchoLight, Response, share_before};
-use super::likelihood::{
-    BESIDE, ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO, WIDE_IN_REGION,
-};
+use self::many_starts::with_rivals;
+use super::expected::{EchoLight, Response};
+use super::likelihood::{ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO, WIDE_IN_REGION};
 use super::peak::Peak;
+use super::place::{SHORT, averaged};
 use crate::chip::EventType;
 
-/// Ambiguity: another light whose deviance is larger by less than [`AS_GOOD`], at a place more than [`ELSEWHERE`]
-/// bounds away.
-const AS_GOOD: f64 = 9.0;
-const ELSEWHERE: f64 = 4.0;
+mod many_starts;
 
 /// Shares of the most background with which the best fit under a THRESHOLD is tried again: chosen. Of 495 random lights under a
 /// THRESHOLD six were fitted more than half a bound beside without, and one is with it.
 const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 
 /// Deviance that a width of its own must save (Akaike).
-const OF_A_WIDTH: f64 = 2.0;
+pub(super) const OF_A_WIDTH: f64 = 2.0;
 
 /// Standard deviation with which a deep echo is sought, bins: chosen.
 const DEEP_BINS: f64 = 2.5;
 
 /// A bound, bins, up to which no deep echo is sought: photons of such an echo are many, and a wrong width explains no counts.
 const WELL_KNOWN: f64 = 0.05;
-
-/// Deviance by which another light may be less likely and still be within a standard deviation.
-const RIVAL: f64 = 1.0;
-
-/// How much more the deviance of a fit with the fewest steps may be than the least of them before it is not refined. Of 3100 random
-/// lights the best and those as good as it had at most 20 more, where a third of all fits had more than 30. With a
-/// THRESHOLD it was up to 28 000, and all are refined.
-const FAR: f64 = 30.0;
 
 /// Range walk stays in a depth, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -143,10 +132,11 @@ impl WalkCorrection {
         };
         let linear = self.linear_start(counts, cycles, (peak, background));
         let (of_all, wide) = (likelihood(ECHO), likelihood(WIDE_ECHO));
-        let mut best = match &linear {
-            Some(start) => of_all.maximise(start),
+        let mut fits = match &linear {
+            Some(start) => vec![of_all.maximise(start)],
             None => self.of_many(&of_all, (peak, background))?,
         };
+        let best = fits[0];
         // The glow after an echo that came before the window may look like a weaker one.
         let begins_unseen = best.light.position_bins < 2.0 * best.light.sigma_bins;
         // So may the few bins in which enough SPADs fire, before all are blind.
@@ -154,28 +144,63 @@ impl WalkCorrection {
         let is_edge = counting.threshold > 0 && best.light.signal > counting.spads as f64;
         let begins_unseen = begins_unseen || is_edge;
         if linear.is_some() && begins_unseen {
-            best = self.of_many(&of_all, (peak, background))?;
+            fits = self.of_many(&of_all, (peak, background))?;
         }
-        best = self.darker(&of_all, best);
-        if best.explains() {
-            return self.widened(&wide, best).map(Corrected::from);
+        fits[0] = self.darker(&of_all, fits[0]);
+        if fits[0].explains() {
+            return self.told(&wide, &fits);
         }
         // Few photons are an echo in one place only.
-        let is_weak = best.has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
+        let is_weak = fits[0].has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
         if linear.is_some() && !is_weak && !begins_unseen {
-            best = self.darker(&of_all, self.of_many(&of_all, (peak, background))?);
-            if best.explains() {
-                return self.widened(&wide, best).map(Corrected::from);
+            fits = self.of_many(&of_all, (peak, background))?;
+            fits[0] = self.darker(&of_all, fits[0]);
+            if fits[0].explains() {
+                return self.told(&wide, &fits);
             }
         }
+        let best = fits[0];
         let of_wide = wide.maximise(&best.light);
         if of_wide.explains() && of_wide.light.sigma_bins < self.widest() {
-            return Ok(of_wide.into());
+            let told = if self.is_short(&of_wide) {
+                averaged(&wide, &[of_wide], &of_wide)
+            } else {
+                of_wide
+            };
+            return Ok(told.into());
         }
-        match best.is_close() {
-            false => Err(WalkLeft::NotOneEcho),
-            true => Err(WalkLeft::NotConverged),
+        if !best.is_close() {
+            return Err(WalkLeft::NotOneEcho);
         }
+        // Fits need not converge on the flat stretch that is a short pulse's place.
+        if self.is_short(&best) {
+            return self.told(&wide, &fits);
+        }
+        Err(WalkLeft::NotConverged)
+    }
+
+    /// Whether counts may not tell the place of a pulse within a bin.
+    fn has_short_pulses(&self) -> bool {
+        self.response.pulse_sigma_bins < SHORT && self.response.counting.threshold == 0
+    }
+
+    /// The same of this echo, which may be wider.
+    fn is_short(&self, fit: &Fit) -> bool {
+        self.has_short_pulses() && fit.light.sigma_bins < SHORT
+    }
+
+    /// What is told of the lights that explain the counts, the most likely first.
+    ///
+    /// # Errors
+    /// As `widened`.
+    fn told(&self, wide: &Likelihood<'_>, fits: &[Fit]) -> Result<Corrected, WalkLeft> {
+        let widened = self.widened(wide, fits[0])?;
+        let told = if self.is_short(&fits[0]) {
+            averaged(wide, fits, &widened)
+        } else {
+            widened
+        };
+        Ok(told.into())
     }
 
     /// The same echo with its own width, where its counts ask for one. Of a deep surface with few counts a bin, the pulse alone finds the
@@ -327,87 +352,6 @@ impl WalkCorrection {
         self.echo_in(bins, counts, cycles, background_per_bin)
     }
 
-    /// The best of fits from many starts: for each of many signals the best place.
-    fn of_many(
-        &self,
-        likelihood: &Likelihood<'_>,
-        (peak, background_per_bin): (&Peak, f64),
-    ) -> Result<Fit, WalkLeft> {
-        let sigma_bins = self.response.pulse_sigma_bins;
-        let edge = self.rising_edge(likelihood, background_per_bin);
-        let has_threshold = self.response.counting.threshold > 0;
-        let edge_is_seen = |bin: usize| bin as f64 > 1.0 + sigma_bins;
-        let mut starts: Vec<(f64, EchoLight)> = Vec::new();
-        // Where light makes bins count less, too, each light has its own places.
-        let (step, fits) = match edge {
-            // With a THRESHOLD few bins count, and several lights may explain them.
-            Some((bin, _)) if edge_is_seen(bin) && self.response.counting.threshold == 0 => {
-                (0.4, 2)
-            }
-            Some(_) => (0.2, 24),
-            None => (0.2, 8),
-        };
-        for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
-            let signal = libm::pow(10f64, step * f64::from(number));
-            let light = |position_bins: f64| EchoLight {
-                position_bins,
-                signal,
-                background_per_bin,
-                sigma_bins,
-            };
-            let places: Vec<f64> = match edge {
-                // The light until the end of the edge's bin says how much of the pulse has come.
-                Some((bin, photons)) if edge_is_seen(bin) => {
-                    let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
-                    [-0.3, 0.0, 0.3].map(|off| end + off).to_vec()
-                }
-                Some(_) => (-12..=12)
-                    .map(|n| 0.3 * f64::from(n))
-                    .filter(|place| *place >= -BESIDE * sigma_bins)
-                    .collect(),
-                None => (-10..=40)
-                    .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
-                    .collect(),
-            };
-            let judged = places
-                .into_iter()
-                .map(light)
-                .map(|light| (likelihood.deviance(&light), light));
-            starts.extend(judged.min_by(|a, b| a.0.total_cmp(&b.0)));
-        }
-        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut near: Vec<Fit> = Vec::new();
-        for (_, start) in starts.iter().take(fits) {
-            add_new(&mut near, likelihood.near(start));
-        }
-        let least = near
-            .iter()
-            .map(|fit| fit.deviance)
-            .fold(f64::INFINITY, f64::min);
-        near.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
-        let may_win = |fit: &&Fit| has_threshold || fit.deviance < least + FAR;
-        let mut fits: Vec<Fit> = (near.iter().filter(may_win))
-            .map(|near| likelihood.refined(near))
-            .collect();
-        // Those that have converged first, then the most likely. Under a THRESHOLD the most likely may converge slowly.
-        let is_behind = |fit: &Fit| !has_threshold && !fit.has_converged;
-        fits.sort_by(|a, b| {
-            let behind = is_behind(a).cmp(&is_behind(b));
-            behind.then(a.deviance.total_cmp(&b.deviance))
-        });
-        let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
-        let is_another = |fit: &Fit| {
-            let off = (fit.light.position_bins - best.light.position_bins).abs();
-            fit.deviance < best.deviance + AS_GOOD
-                && off > ELSEWHERE * best.bound_bins.max(fit.bound_bins)
-        };
-        match fits.iter().filter(|fit| fit.has_converged).any(is_another) {
-            true => Err(WalkLeft::Ambiguous),
-            false if has_threshold => Ok(with_rivals(best, &fits, likelihood)),
-            false => Ok(best),
-        }
-    }
-
     /// The best of a fit and of those with less background. Under a THRESHOLD bins without an echo say next to nothing of the background, and
     /// fits stay where it is too much.
     fn darker(&self, likelihood: &Likelihood<'_>, best: Fit) -> Fit {
@@ -460,62 +404,6 @@ impl WalkCorrection {
         // No count in a bin allows three.
         [begin, self.light((few + 3.0) / cycles)]
     }
-
-    /// The first bin of an echo's rising edge, and the photons of the echo until its end.
-    fn rising_edge(&self, likelihood: &Likelihood<'_>, background: f64) -> Option<(usize, f64)> {
-        let counting = self.response.counting;
-        if counting.event_type != EventType::Greater {
-            return None;
-        }
-        let light = |&counts: &f64| self.light((counts / likelihood.cycles).min(0.99)) - background;
-        let bins = likelihood.counts.iter().map(light);
-        let bins: Vec<f64> = bins.collect();
-        let most = bins.iter().copied().fold(0.0, f64::max);
-        let bin = bins.iter().position(|&photons| photons > 0.2 * most)?;
-        Some((bin, bins[bin]))
-    }
-}
-
-/// Standard deviations before which so much of a Gaussian pulse has come; no farther than its ends.
-fn quantile(share: f64) -> f64 {
-    let (mut low, mut high) = (-6.0, 6.0);
-    for _ in 0..20 {
-        let middle = 0.5 * (low + high);
-        match share_before(middle).0 < share {
-            true => low = middle,
-            false => high = middle,
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// The best fit, with a bound that reaches to every other light with which the counts are about as likely.
-fn with_rivals(best: Fit, fits: &[Fit], likelihood: &Likelihood<'_>) -> Fit {
-    let rivals = fits.iter().filter(|fit| {
-        fit.deviance < best.deviance + RIVAL
-            && fit.light.background_per_bin <= likelihood.most_background
-    });
-    let offs = rivals.map(|fit| (fit.light.position_bins - best.light.position_bins).abs());
-    Fit {
-        bound_bins: offs.fold(best.bound_bins, f64::max),
-        ..best
-    }
-}
-
-/// Adds a fit unless one before found the same light; whether it did.
-fn add_new(fits: &mut Vec<Fit>, fit: Fit) -> bool {
-    let is_same = |other: &Fit| {
-        let off = (fit.light.position_bins - other.light.position_bins).abs();
-        let times = libm::log(fit.light.signal / other.light.signal).abs();
-        (fit.deviance - other.deviance).abs() < 0.1 + 1e-3 * fit.deviance
-            && off < 0.1 * fit.bound_bins.min(1.0)
-            && times < 0.1
-    };
-    let is_new = !fits.iter().any(is_same);
-    if is_new {
-        fits.push(fit);
-    }
-    is_new
 }
 
 impl From<Fit> for Corrected {

@@ -1,7 +1,9 @@
 //! Where fits start, which of them are one, and what is left of their bounds, against what each is defined to be.
 
+use super::many_starts::{add_new, quantile};
 use super::*;
 use crate::chip::SensorConfig;
+use crate::ranging::expected::share_before;
 use crate::units::Time;
 use proptest::prelude::*;
 
@@ -180,6 +182,14 @@ fn a_rising_edge_is_the_first_bin_with_a_fifth_of_the_most_light() {
         Some((2, light(990.0)))
     );
     assert_eq!(edge([10.0; 6]), None);
+    // The bin before it tells where a short pulse begins.
+    let mut short = walk;
+    short.response.pulse_sigma_bins = 0.1;
+    for (before, expected) in [(10.0, photons(0.5)), (30.0, photons(30.0) - photons(10.0))] {
+        let counts = [10.0, before, 1000.0, 1000.0, 10.0, 10.0];
+        let found = short.rising_edge(&likelihood(&short, &counts), photons(10.0));
+        assert!(found.is_some_and(|(bin, light)| bin == 1 && (light - expected).abs() < 1e-9));
+    }
     let config = SensorConfig {
         event_type: EventType::Less,
         threshold: 4,

@@ -1,0 +1,127 @@
+//! Where an echo may lie, where the curvature of the likelihood does not say it.
+//!
+//! ```text
+//!   likelihood   ▁▂███████▂▁      a pulse shorter than a bin: any place within the bin explains the counts as well
+//!                ▁▂▇▂▁▁▁▂▅▂▁      strong light: a weaker echo here or a stronger one there
+//!                    ▲
+//!                  mean, and five bounds reach to all that is not unlikely
+//! ```
+//!
+//! The Cramér-Rao bound is that of the place where a fit ends, be it the steep end of a flat stretch. So the place is the mean over all
+//! places, each weighed by its likelihood under the best signal there, and the bound their standard deviation.
+
+use super::likelihood::{Fit, Likelihood};
+use super::walk::OF_A_WIDTH;
+
+/// Standard deviation of a pulse most of which lies within a bin, bins.
+pub(super) const SHORT: f64 = 0.4;
+
+/// Bins either side of a fit in which other places are tried: what a short pulse may be off by, and some more.
+const AROUND: f64 = 1.25;
+
+/// Places to a bin.
+const PLACES: f64 = 16.0;
+
+/// Places about the fit itself, in its bounds.
+const NEAR: [f64; 8] = [-3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0];
+
+/// Deviance by which a place may be less likely and still is within five bounds: of 2000 echoes one is beyond.
+pub(super) const UNLIKELY: f64 = 12.0;
+
+/// Bounds within which such places are.
+const REACH: f64 = 4.0;
+
+/// A place that an echo may have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    /// Bins.
+    pub(super) bins: f64,
+    /// How many places it stands for, bins.
+    pub(super) width: f64,
+    /// Variance of those, bins².
+    pub(super) variance: f64,
+    /// Twice the ln likelihood that it lacks.
+    pub(super) deviance: f64,
+}
+
+/// The mean of places and its bound, bins.
+pub(super) fn mean_place(places: &[Place]) -> (f64, f64) {
+    let least = places.iter().map(|place| place.deviance);
+    let least = least.fold(f64::INFINITY, f64::min);
+    let weight = |place: &Place| place.width * libm::exp(0.5 * (least - place.deviance));
+    let total: f64 = places.iter().map(weight).sum();
+    let mean_of = |value: &dyn Fn(&Place) -> f64| {
+        let weighed = places.iter().map(|place| weight(place) * value(place));
+        weighed.sum::<f64>() / total
+    };
+    let mean = mean_of(&|place| place.bins);
+    let variance = mean_of(&|place| place.variance + (place.bins - mean).powi(2));
+    let likely = places.iter().filter(|p| p.deviance < least + UNLIKELY);
+    let farthest = likely
+        .map(|place| (place.bins - mean).abs())
+        .fold(0.0, f64::max);
+    (mean, variance.sqrt().max(farthest / REACH))
+}
+
+/// The fit of a short pulse with the mean of all its places: with the pulse's own width about each of the fits `narrow`, and with that of
+/// `chosen`.
+pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit) -> Fit {
+    let own = narrow.iter().flat_map(|fit| places_of(likelihood, fit));
+    let mut places: Vec<Place> = own.collect();
+    if chosen.light.sigma_bins > narrow[0].light.sigma_bins {
+        let wider = if chosen.light.sigma_bins < SHORT {
+            places_of(likelihood, chosen)
+        } else {
+            vec![Place {
+                bins: chosen.light.position_bins,
+                width: 2.5 * chosen.bound_bins,
+                variance: chosen.bound_bins.powi(2),
+                deviance: chosen.deviance,
+            }]
+        };
+        places.extend(wider.into_iter().map(|place| Place {
+            deviance: place.deviance + OF_A_WIDTH,
+            ..place
+        }));
+    }
+    let (position_bins, bound_bins) = mean_place(&places);
+    let mut averaged = *chosen;
+    averaged.light.position_bins = position_bins;
+    averaged.bound_bins = bound_bins;
+    averaged
+}
+
+/// Places about a fit, each with the best signal there.
+fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
+    let held = Likelihood {
+        free: [false, true, false, false],
+        ..likelihood.clone()
+    };
+    let own = fit.bound_bins.min(1.0 / PLACES);
+    let steps = (AROUND * PLACES) as i32;
+    let offsets = (-steps..=steps).map(|n| f64::from(n) / PLACES);
+    let mut offsets: Vec<f64> = offsets.chain(NEAR.map(|by| by * own)).collect();
+    offsets.sort_by(f64::total_cmp);
+    offsets.dedup_by(|a, b| *a - *b < 1e-9);
+    let middle = offsets.partition_point(|off| *off < 0.0);
+    let mut deviances = vec![0.0; offsets.len()];
+    let mut follow = |order: &mut dyn Iterator<Item = usize>| {
+        let mut light = fit.light;
+        for at in order {
+            light.position_bins = fit.light.position_bins + offsets[at];
+            let near = held.near(&light);
+            light.signal = near.light.signal;
+            deviances[at] = near.deviance;
+        }
+    };
+    follow(&mut (middle..offsets.len()));
+    follow(&mut (0..middle).rev());
+    let last = offsets.len() - 1;
+    let place = |at: usize| Place {
+        bins: fit.light.position_bins + offsets[at],
+        width: 0.5 * (offsets[(at + 1).min(last)] - offsets[at.saturating_sub(1)]),
+        variance: 0.0,
+        deviance: deviances[at],
+    };
+    (0..=last).map(place).collect()
+}

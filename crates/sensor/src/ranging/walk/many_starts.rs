@@ -1,0 +1,195 @@
+//! The lights that may have made a strong echo: fits from many starts.
+//!
+//! ```text
+//!   for each of many signals: the place at which the rising edge is as it was counted ─► the likeliest of these ─► fits ─► the best
+//! ```
+//!
+//! Strong light leaves the rising edge and little else, so that a weaker echo here and a stronger one there may explain the same counts.
+
+use super::{WalkCorrection, WalkLeft};
+use crate::chip::EventType;
+use crate::ranging::expected::{EchoLight, share_before};
+use crate::ranging::likelihood::{BESIDE, Fit, Likelihood};
+use crate::ranging::peak::Peak;
+use crate::ranging::place::UNLIKELY;
+
+/// Ambiguity: another light whose deviance is larger by less than [`AS_GOOD`], at a place more than [`ELSEWHERE`]
+/// bounds away.
+const AS_GOOD: f64 = 9.0;
+const ELSEWHERE: f64 = 4.0;
+
+/// Deviance by which another light may be less likely and still be within a standard deviation.
+const RIVAL: f64 = 1.0;
+
+/// How much more the deviance of a fit with the fewest steps may be than the least of them before it is not refined. Of 3100 random
+/// lights the best and those as good as it had at most 20 more, where a third of all fits had more than 30. With a
+/// THRESHOLD it was up to 28 000, and all are refined.
+const FAR: f64 = 30.0;
+
+impl WalkCorrection {
+    /// The best of fits from many starts: for each of many signals the best place. Behind it are those that may be it as well, where
+    /// pulses are short.
+    pub(super) fn of_many(
+        &self,
+        likelihood: &Likelihood<'_>,
+        (peak, background_per_bin): (&Peak, f64),
+    ) -> Result<Vec<Fit>, WalkLeft> {
+        let sigma_bins = self.response.pulse_sigma_bins;
+        let edge = self.rising_edge(likelihood, background_per_bin);
+        let has_threshold = self.response.counting.threshold > 0;
+        let is_short = self.has_short_pulses();
+        let edge_is_seen = |bin: usize| bin as f64 > 1.0 + sigma_bins;
+        let mut starts: Vec<(f64, EchoLight)> = Vec::new();
+        // Where light makes bins count less, too, each light has its own places.
+        let (step, fits) = match edge {
+            // With a THRESHOLD few bins count, and several lights may explain them.
+            Some((bin, _)) if edge_is_seen(bin) && is_short => (0.1, 4),
+            Some((bin, _)) if edge_is_seen(bin) && !has_threshold => (0.4, 2),
+            Some(_) => (0.2, 24),
+            None => (0.2, 8),
+        };
+        for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
+            let signal = libm::pow(10f64, step * f64::from(number));
+            let light = |position_bins: f64| EchoLight {
+                position_bins,
+                signal,
+                background_per_bin,
+                sigma_bins,
+            };
+            let places: Vec<f64> = match edge {
+                // The light until the end of the edge's bin says how much of the pulse has come.
+                Some((bin, photons)) if edge_is_seen(bin) => {
+                    let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
+                    [-0.3, 0.0, 0.3].map(|off| end + off).to_vec()
+                }
+                Some(_) => (-12..=12)
+                    .map(|n| 0.3 * f64::from(n))
+                    .filter(|place| *place >= -BESIDE * sigma_bins)
+                    .collect(),
+                None => (-10..=40)
+                    .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
+                    .collect(),
+            };
+            let judged = places
+                .into_iter()
+                .map(light)
+                .map(|light| (likelihood.deviance(&light), light));
+            starts.extend(judged.min_by(|a, b| a.0.total_cmp(&b.0)));
+        }
+        if is_short {
+            starts = least_of(&starts);
+        }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut near: Vec<Fit> = Vec::new();
+        for (_, start) in starts.iter().take(fits) {
+            add_new(&mut near, likelihood.near(start));
+        }
+        let least = near
+            .iter()
+            .map(|fit| fit.deviance)
+            .fold(f64::INFINITY, f64::min);
+        near.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
+        let may_win = |fit: &&Fit| has_threshold || fit.deviance < least + FAR;
+        let mut fits: Vec<Fit> = (near.iter().filter(may_win))
+            .map(|near| likelihood.refined(near))
+            .collect();
+        // Those that have converged first, then the most likely. Under a THRESHOLD the most likely may converge slowly.
+        let is_behind = |fit: &Fit| !has_threshold && !fit.has_converged;
+        fits.sort_by(|a, b| {
+            let behind = is_behind(a).cmp(&is_behind(b));
+            behind.then(a.deviance.total_cmp(&b.deviance))
+        });
+        let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
+        let is_another = |fit: &Fit| {
+            let off = (fit.light.position_bins - best.light.position_bins).abs();
+            fit.deviance < best.deviance + AS_GOOD
+                && off > ELSEWHERE * best.bound_bins.max(fit.bound_bins)
+        };
+        let is_ambiguous = fits.iter().filter(|fit| fit.has_converged).any(is_another);
+        if is_short {
+            fits.retain(|fit| fit.deviance < best.deviance + UNLIKELY);
+            return Ok(fits);
+        }
+        match is_ambiguous {
+            true => Err(WalkLeft::Ambiguous),
+            false if has_threshold => Ok(vec![with_rivals(best, &fits, likelihood)]),
+            false => Ok(vec![best]),
+        }
+    }
+
+    /// The first bin of an echo's rising edge, and the photons of the echo until its end. Of a full bin these are not known: where pulses are
+    /// short, the edge is then the bin before it, with half a photon of all laser cycles at least.
+    pub(super) fn rising_edge(
+        &self,
+        likelihood: &Likelihood<'_>,
+        background: f64,
+    ) -> Option<(usize, f64)> {
+        let counting = self.response.counting;
+        if counting.event_type != EventType::Greater {
+            return None;
+        }
+        let light = |&counts: &f64| self.light((counts / likelihood.cycles).min(0.99)) - background;
+        let bins = likelihood.counts.iter().map(light);
+        let bins: Vec<f64> = bins.collect();
+        let most = bins.iter().copied().fold(0.0, f64::max);
+        let bin = bins.iter().position(|&photons| photons > 0.2 * most)?;
+        let is_full = likelihood.counts[bin] > 0.98 * likelihood.cycles;
+        if is_full && bin > 0 && self.has_short_pulses() {
+            let least = self.light(0.5 / likelihood.cycles);
+            return Some((bin - 1, bins[bin - 1].max(least)));
+        }
+        Some((bin, bins[bin]))
+    }
+}
+
+/// Starts of signals in a row that are better than their neighbours: those between lead to the same light.
+fn least_of(starts: &[(f64, EchoLight)]) -> Vec<(f64, EchoLight)> {
+    let deviance = |at: usize| starts.get(at).map_or(f64::INFINITY, |start| start.0);
+    let is_least = |at: &usize| {
+        deviance(*at) <= deviance(at + 1) && deviance(*at) < deviance(at.wrapping_sub(1))
+    };
+    let least = (0..starts.len()).filter(is_least);
+    least.map(|at| starts[at]).collect()
+}
+
+/// Standard deviations before which so much of a Gaussian pulse has come; no farther than its ends.
+pub(super) fn quantile(share: f64) -> f64 {
+    let (mut low, mut high) = (-6.0, 6.0);
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        match share_before(middle).0 < share {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// The best fit, with a bound that reaches to every other light with which the counts are about as likely.
+pub(super) fn with_rivals(best: Fit, fits: &[Fit], likelihood: &Likelihood<'_>) -> Fit {
+    let rivals = fits.iter().filter(|fit| {
+        fit.deviance < best.deviance + RIVAL
+            && fit.light.background_per_bin <= likelihood.most_background
+    });
+    let offs = rivals.map(|fit| (fit.light.position_bins - best.light.position_bins).abs());
+    Fit {
+        bound_bins: offs.fold(best.bound_bins, f64::max),
+        ..best
+    }
+}
+
+/// Adds a fit unless one before found the same light; whether it did.
+pub(super) fn add_new(fits: &mut Vec<Fit>, fit: Fit) -> bool {
+    let is_same = |other: &Fit| {
+        let off = (fit.light.position_bins - other.light.position_bins).abs();
+        let times = libm::log(fit.light.signal / other.light.signal).abs();
+        (fit.deviance - other.deviance).abs() < 0.1 + 1e-3 * fit.deviance
+            && off < 0.1 * fit.bound_bins.min(1.0)
+            && times < 0.1
+    };
+    let is_new = !fits.iter().any(is_same);
+    if is_new {
+        fits.push(fit);
+    }
+    is_new
+}
