@@ -10,8 +10,8 @@
 //! The Cramér-Rao bound is that of the place where a fit ends, be it the steep end of a flat stretch. So the place is the mean over all
 //! places, each weighed by its likelihood under the best signal there, and the bound their standard deviation.
 
+use super::expected::EchoLight;
 use super::likelihood::{Fit, Likelihood};
-use super::walk::OF_A_WIDTH;
 
 /// Standard deviation of a pulse most of which lies within a bin, bins.
 pub(super) const SHORT: f64 = 0.4;
@@ -24,6 +24,9 @@ const PLACES: f64 = 16.0;
 
 /// Places about the fit itself, in its bounds.
 const NEAR: [f64; 8] = [-3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0];
+
+/// Standard deviations of surfaces, bins: between two bins a pulse ends at a place that its width decides, and any surface has some depth.
+const DEPTHS: [f64; 3] = [0.1, 0.2, 0.4];
 
 /// Deviance by which a place may be less likely and still is within five bounds: of 2000 echoes one is beyond.
 pub(super) const UNLIKELY: f64 = 12.0;
@@ -63,27 +66,32 @@ pub(super) fn mean_place(places: &[Place]) -> (f64, f64) {
     (mean, variance.sqrt().max(farthest / REACH))
 }
 
-/// The fit of a short pulse with the mean of all its places: with the pulse's own width about each of the fits `narrow`, and with that of
-/// `chosen`.
+/// The fit of a short pulse with the mean of all its places: with the pulse's own width about each of the fits `narrow`, with that of `chosen`,
+/// and with those of surfaces that are somewhat deep.
 pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit) -> Fit {
     let own = narrow.iter().flat_map(|fit| places_of(likelihood, fit));
-    let mut places: Vec<Place> = own.collect();
-    if chosen.light.sigma_bins > narrow[0].light.sigma_bins {
-        let wider = if chosen.light.sigma_bins < SHORT {
-            places_of(likelihood, chosen)
-        } else {
-            vec![Place {
-                bins: chosen.light.position_bins,
-                width: 2.5 * chosen.bound_bins,
-                variance: chosen.bound_bins.powi(2),
-                deviance: chosen.deviance,
-            }]
-        };
-        places.extend(wider.into_iter().map(|place| Place {
-            deviance: place.deviance + OF_A_WIDTH,
-            ..place
-        }));
-    }
+    let [place, signal, background, _] = likelihood.free;
+    let held = Likelihood {
+        free: [place, signal, background, false],
+        ..likelihood.clone()
+    };
+    let first = narrow[0].light;
+    let deep = DEPTHS.map(|depth| {
+        held.maximise(&EchoLight {
+            sigma_bins: libm::hypot(first.sigma_bins, depth),
+            ..first
+        })
+    });
+    let is_wider = chosen.light.sigma_bins > first.sigma_bins;
+    let wider = deep.iter().chain(is_wider.then_some(chosen));
+    // Where these tell no place either, those of the pulse's own width reach as far.
+    let steep = wider.filter(|fit| fit.bound_bins < 0.5).map(|fit| Place {
+        bins: fit.light.position_bins,
+        width: (std::f64::consts::TAU).sqrt() * fit.bound_bins,
+        variance: fit.bound_bins.powi(2),
+        deviance: fit.deviance,
+    });
+    let places: Vec<Place> = own.chain(steep).collect();
     let (position_bins, bound_bins) = mean_place(&places);
     let mut averaged = *chosen;
     averaged.light.position_bins = position_bins;
@@ -117,11 +125,14 @@ fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
     follow(&mut (middle..offsets.len()));
     follow(&mut (0..middle).rev());
     let last = offsets.len() - 1;
-    let place = |at: usize| Place {
-        bins: fit.light.position_bins + offsets[at],
-        width: 0.5 * (offsets[(at + 1).min(last)] - offsets[at.saturating_sub(1)]),
-        variance: 0.0,
-        deviance: deviances[at],
+    let place = |at: usize| {
+        let width = 0.5 * (offsets[(at + 1).min(last)] - offsets[at.saturating_sub(1)]);
+        Place {
+            bins: fit.light.position_bins + offsets[at],
+            width,
+            variance: width * width / 12.0,
+            deviance: deviances[at],
+        }
     };
     (0..=last).map(place).collect()
 }
