@@ -45,7 +45,7 @@ pub(super) struct FrameArgs {
     #[arg(long, value_name = "R,C")]
     probe: Vec<String>,
     /// Laser cycles in the waveforms of probes: the first N, or `all` [default: the first that counts, one before it
-    /// and two after it].
+    /// and two after it]. No others are simulated at gate level, beyond the first 64.
     #[arg(long, value_name = "N|all", value_parser = wave_cycles)]
     wave_cycles: Option<WaveCycles>,
     /// Format of the waveforms of probes.
@@ -335,9 +335,9 @@ fn table(
     let met = if timing.met { "met" } else { "FAILS" };
     table.push("timing, slack", format!("{met}, {left_over}"));
     table.push("timing, tightest", &timing.check);
-    for (row, col) in &frame.probes {
+    for ((row, col), cycles) in frame.probes.iter().zip(&frame.probed_cycles) {
         let engine = args.exposure.engine.of_probes(frame.kept.is_some());
-        let agrees = format!("agrees with {engine:?} engine").to_lowercase();
+        let agrees = format!("agrees with {engine:?} in {cycles} laser cycles").to_lowercase();
         table.push(format!("gate level ({row}, {col})"), agrees);
     }
     let times = &frame.times;

@@ -124,7 +124,8 @@ pub fn take_guided_frame<A: Answer>(
     let together_s = clock.lap();
     let load = load?;
     let (counted, ranged) = measured?;
-    plan.judge(&counted, probed?)?;
+    let probed = probed?;
+    plan.judge(&counted, &probed)?;
 
     Ok(Frame {
         rows: sensor.rows,
@@ -142,6 +143,7 @@ pub fn take_guided_frame<A: Answer>(
         readout_time: sensor.readout_time(),
         exposure_time: settings.exposure.end(),
         probes: probes.iter().map(|p| (p.row, p.col)).collect(),
+        probed_cycles: probed.iter().map(|p| p.exposure.laser_cycles).collect(),
         times: PhaseTimes {
             scene_s,
             load_s,
@@ -307,34 +309,45 @@ impl Plan<'_> {
         let s = self.settings;
         let run = |probe| {
             go_on(done(0))?;
-            AtGates::run(&s.sensor, &s.exposure, &light.stream, &light.pixels, probe)
+            AtGates::run(s, &light.stream, &light.pixels, probe)
         };
         probes.par_iter().map(run).collect()
     }
 
-    /// Compares every probe with the frame's counts, or with those of the `window` engine where the frame's engine has no photons.
+    /// Compares every probe with the frame's counts, or with those of the `window` engine where the frame's engine has no photons, or the
+    /// probe simulates a part of the exposure. That engine is then compared with the frame.
     ///
     /// # Errors
     /// The first disagreement.
-    fn judge(&self, counted: &Counted, probed: Vec<AtGates>) -> Result<(), FrameError> {
+    fn judge(&self, counted: &Counted, probed: &[AtGates]) -> Result<(), FrameError> {
         let s = self.settings;
         let has_tolerance = counted.kept.is_some();
         let engine = s.engine.of_probes(has_tolerance);
         for probed in probed {
-            let model = match has_tolerance || engine != s.engine {
-                true => {
-                    Window::new(&s.sensor, &s.exposure).histogram(probed.start, &probed.events)?
+            let agree = |gate: Vec<u16>, model: Vec<u16>| {
+                if gate == model {
+                    return Ok(());
                 }
-                false => counted.exposed.histograms[probed.pixel].to_vec(),
-            };
-            if probed.counts != model {
-                return Err(FrameError::Disagreement {
+                Err(FrameError::Disagreement {
                     row: probed.pixel / s.sensor.cols,
                     col: probed.pixel % s.sensor.cols,
                     engine,
-                    gate: probed.counts,
+                    gate,
                     model,
-                });
+                })
+            };
+            let by_window = |exposure: &Exposure, events: &[SpadEvent]| {
+                Window::new(&s.sensor, exposure).histogram(probed.start, events)
+            };
+            let counted = counted.exposed.histograms[probed.pixel].to_vec();
+            if engine != EngineKind::Window {
+                agree(probed.counts.clone(), counted)?;
+                continue;
+            }
+            let simulated = by_window(&probed.exposure, probed.simulated())?;
+            agree(probed.counts.clone(), simulated)?;
+            if s.engine == engine && !has_tolerance {
+                agree(by_window(&s.exposure, &probed.events)?, counted)?;
             }
         }
         Ok(())
@@ -404,19 +417,22 @@ fn refused_by(
 struct AtGates {
     pixel: usize,
     start: u16,
+    /// Pulses of the frame's exposure.
     events: Vec<SpadEvent>,
+    /// What was simulated of it.
+    exposure: Exposure,
     counts: Vec<u16>,
 }
 
 impl AtGates {
-    /// Runs a probe, and writes its waveform.
+    /// Runs a probe, and writes its waveform. Only part of the exposure is simulated where the window law tells the rest.
     fn run(
-        sensor: &Sensor,
-        exposure: &Exposure,
+        settings: &FrameSettings,
         stream: &PhotonStream,
         pixels: &[LitPixel],
         probe: &Probe,
     ) -> Result<Self, FrameError> {
+        let (sensor, exposure) = (&settings.sensor, &settings.exposure);
         let at = (probe.row, probe.col);
         let pixel = probe.row * sensor.cols + probe.col;
         let LitPixel {
@@ -428,16 +444,33 @@ impl AtGates {
         let photons = photons.map(|light| stream.pixel_events(*number, light));
         let events = photons.unwrap_or_default().events;
         let start = *start;
-        let mut simulation =
-            GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[&events]);
-        let view = View::of_pixel(at, sensor, exposure, start, &events, probe.wave_cycles);
-        let format = WaveFormat::of(&probe.waves);
-        waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
-        Ok(AtGates {
+        let has_tolerance = settings.tolerance_m.is_some();
+        let laser_cycles = match settings.engine.of_probes(has_tolerance) {
+            EngineKind::Window => (probe.wave_cycles).simulated(sensor, exposure, start, &events),
+            _ => exposure.laser_cycles,
+        };
+        let mut probed = AtGates {
             pixel,
             start,
-            counts: simulation.histograms()?.into_counts(),
             events,
-        })
+            exposure: Exposure {
+                laser_cycles,
+                ..*exposure
+            },
+            counts: Vec::new(),
+        };
+        let (part, pulses) = (&probed.exposure, probed.simulated());
+        let mut simulation = GateSimulation::new(sensor, part, at, (1, 1), &[start], &[pulses]);
+        let view = View::of_pixel(at, sensor, part, start, pulses, probe.wave_cycles);
+        let format = WaveFormat::of(&probe.waves);
+        waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
+        probed.counts = simulation.histograms()?.into_counts();
+        Ok(probed)
+    }
+
+    /// Pulses of what was simulated.
+    fn simulated(&self) -> &[SpadEvent] {
+        let end = self.exposure.end();
+        &self.events[..self.events.partition_point(|event| event.time < end)]
     }
 }

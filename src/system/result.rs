@@ -72,6 +72,8 @@ pub struct Frame {
     /// Macropixels that were also run at gate level and agreed to the count, with the `window` engine on the same
     /// photons where the frame's engine is `cohort`, which has none.
     pub probes: Vec<(usize, usize)>,
+    /// Laser cycles that were simulated at gate level of each of them.
+    pub probed_cycles: Vec<u32>,
     /// What the simulation took.
     pub times: PhaseTimes,
 }

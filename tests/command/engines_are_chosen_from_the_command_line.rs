@@ -66,8 +66,25 @@ fn a_probe_names_the_engine_it_is_compared_with() {
         let small = "frame --rows 4 --cols 4 --laser-cycles 2 --set scene.lidar.pde=0.02";
         let small: Vec<&str> = small.split(' ').collect();
         let table = gdtof(here.path(), &[&small[..], &choice].concat());
-        let said = format!("agrees with {compared_with} engine");
+        let said = format!("agrees with {compared_with} in 2 laser cycles");
         assert!(table.contains(&said), "{choice:?}: {table}");
+    }
+}
+
+#[test]
+fn gates_simulate_what_the_waveform_keeps_and_64_laser_cycles_at_least() {
+    for (waves, cycles) in [
+        (&[][..], 64),
+        (&["--wave-cycles", "all"], 100),
+        (&["--wave-cycles", "80"], 81),
+        (&["--engine", "cycle"], 100),
+    ] {
+        let here = tempfile::tempdir().unwrap();
+        let small = "frame --rows 4 --cols 4 --laser-cycles 100";
+        let small: Vec<&str> = small.split(' ').collect();
+        let table = gdtof(here.path(), &[&small[..], waves].concat());
+        let said = format!("in {cycles} laser cycles");
+        assert!(table.contains(&said), "{waves:?}: {table}");
     }
 }
 

@@ -37,7 +37,24 @@ pub enum WaveCycles {
     All,
 }
 
+/// Laser cycles that the simulation of a macropixel has at least, so that there is something to compare: a laser cycle of the gates takes
+/// about 0.4 ms.
+const LEAST_SIMULATED: i64 = 64;
+
 impl WaveCycles {
+    /// Laser cycles to simulate for the waveform of one macropixel: those that it keeps, and 64 at least.
+    pub fn simulated(
+        self,
+        config: &SensorConfig,
+        exposure: &Exposure,
+        start: u16,
+        pulses: &[SpadEvent],
+    ) -> u32 {
+        let (_, until) = self.around(config, exposure, start, pulses);
+        let wanted = LEAST_SIMULATED.max(until + 1);
+        wanted.min(exposure.laser_cycles.into()) as u32
+    }
+
     /// Laser cycles of which the waveform of one macropixel is kept; it has everything from power-up if the first of
     /// them is not after the exposure's first.
     fn around(
