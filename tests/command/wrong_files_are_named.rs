@@ -241,3 +241,45 @@ fn files_of_another_kind_where_results_go_stop_nothing() {
         }
     }
 }
+
+/// Files that a scene names.
+#[test]
+fn every_file_of_a_scene_is_named_if_it_is_of_another_kind() {
+    let dir = workplace();
+    let here = dir.path();
+    let map = "kind = \"map\"\nfocal_px = 100\n";
+    let object = "[[object]]\nname = \"a\"\nreflectivity = 0.3\n";
+    let cube = "kind = \"box\"\ncentre_m = [0, 0, 5]\nsize_m = [1, 1, 1]\ntexture = \"image\"\n";
+    let depths = npy("<f4", "(2, 2)", &5f32.to_le_bytes().repeat(4));
+    std::fs::write(here.join("depths.npy"), depths).unwrap();
+    let mut faults = Vec::new();
+    for (name, bytes) in wrong_files(here) {
+        for (file, text) in [
+            (
+                "part",
+                format!("{object}kind = \"mesh\"\ncentre_m = [0, 0, 5]\nfile = \"part\"\n"),
+            ),
+            ("part", format!("{object}{map}depth_file = \"part\"\n")),
+            (
+                "part",
+                format!("{object}{map}depth_file = \"depths.npy\"\nreflectivity_file = \"part\"\n"),
+            ),
+            ("part", format!("{object}{cube}texture_file = \"part\"\n")),
+            ("part.csv", "[lidar]\npulse = \"part.csv\"\n".to_owned()),
+        ] {
+            std::fs::write(here.join(file), &bytes).unwrap();
+            std::fs::write(here.join("world.toml"), &text).unwrap();
+            let words = "frame world.toml --rows 2 --cols 2 --laser-cycles 2 --probe none --quiet";
+            let words: Vec<&str> = words.split(' ').collect();
+            let run = within(here, &words, LIMIT);
+            let error = String::from_utf8_lossy(&run.stderr).into_owned();
+            // A picture is a texture of any size.
+            if name == "whole.png" && text.contains("texture_file") {
+                assert!(run.status.success(), "{error}");
+            } else if let Some(flaw) = flaw(run.status.code(), &error, &[file]) {
+                faults.push(format!("{name} in {text} {flaw}: {error}"));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
