@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::voice::{note, notes, progress, tell};
+use super::voice::{announce, notes, progress, tell};
 use crate::demo::disturbed::{Disturbance, Outcome};
 use crate::demo::show::{Show, Shown};
 use crate::demo::{Demonstrator, limit, shows, sweep};
@@ -42,9 +42,6 @@ enum Demo {
     /// A wall that throws laser light on a target.
     Corner,
 }
-
-/// Demos that take longer say so first.
-const LONG_S: f64 = 5.0;
 
 impl Demo {
     /// Processor time with the calibration, s, of the release build on one thread, those of `sign` and `interference` beside other work.
@@ -114,13 +111,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         .unwrap_or_else(|| PathBuf::from(format!("demo_{}", name.get_name())));
     let results = ResultSet::begin(&out, "demo")?;
     let seconds = args.demo.processor_s() / rayon::current_num_threads() as f64;
-    if seconds > LONG_S {
-        note(format_args!(
-            "{} takes about {seconds:.0} s on {} threads",
-            name.get_name(),
-            rayon::current_num_threads()
-        ));
-    }
+    announce(name.get_name(), seconds);
     let began = Instant::now();
     let bar = |what: &str, length: u64| {
         let template = format!("{what} {{bar:40}} {{pos}}/{{len}}, {{eta}} left");

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
-use super::voice::{notes, progress, say_file, tell};
+use super::voice::{announce, notes, progress, say_file, tell};
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
@@ -207,11 +207,17 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         true => Some(Foxglove::begin(&mcap, &settings)?),
         false => None,
     };
+    let first = Instant::now();
     let progress = progress(
         args.frames.into(),
         "driving {bar:40} {pos}/{len} frames, {eta} left",
     );
     for number in 0..args.frames {
+        if number == 1 {
+            // The first frame takes as long as the others, or longer.
+            let rest_s = first.elapsed().as_secs_f64() * f64::from(args.frames - 1);
+            progress.suspend(|| announce("the rest of the drive", rest_s));
+        }
         let frame = drive.frame(|_| {})?;
         let picture = format!("depth_{number:05}.png");
         let picture = (!args.no_pictures).then_some(picture);

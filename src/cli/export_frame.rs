@@ -1,11 +1,11 @@
 //! `gdtof export frame`: a frame as point clouds and arrays.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
 use super::voice::{notes, tell};
-use crate::files::{ResultSet, read_counts};
+use crate::files::{InputError, ResultSet, read_counts};
 use crate::report::{Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
 use crate::system::{NoDepth, PixelDepth, RETURNS, Return, TakenFrame, cloud};
 
@@ -38,6 +38,16 @@ enum Format {
     Png16,
 }
 
+/// The frame's file in a folder.
+fn frame_json(folder: &Path) -> Result<PathBuf, InputError> {
+    let path = folder.join("frame.json");
+    if path.exists() {
+        return Ok(path);
+    }
+    let message = "has no frame.json; give a folder that `gdtof frame` has written";
+    Err(InputError::new(folder.display(), message))
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -45,7 +55,7 @@ enum Format {
 pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let TakenFrame {
         settings, pixels, ..
-    } = TakenFrame::read(&args.frame.join("frame.json"))?;
+    } = TakenFrame::read(&frame_json(&args.frame)?)?;
     let sensor = &settings.sensor;
     let (rows, cols, bins) = (sensor.rows, sensor.cols, sensor.bins);
     let shape = [rows, cols, bins];

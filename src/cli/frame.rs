@@ -175,7 +175,7 @@ fn wave_cycles(text: &str) -> Result<WaveCycles, String> {
         _ => text
             .parse()
             .map(WaveCycles::First)
-            .map_err(|_| "give a number of laser cycles, or all".to_owned()),
+            .map_err(|_| "is not a number of laser cycles; give one, or all".to_owned()),
     }
 }
 

@@ -29,6 +29,7 @@ mod stereo;
 mod sweep;
 mod tb;
 mod timing;
+mod usage;
 mod voice;
 mod wave;
 
@@ -141,8 +142,8 @@ pub fn main() -> ExitCode {
     }
     let matches = command_line()
         .try_get_matches()
-        .unwrap_or_else(|error| exit_with(&error));
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+        .unwrap_or_else(|error| usage::exit_with(&error));
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| usage::exit_with(&error));
     if cli.quiet {
         voice::be_quiet();
     }
@@ -179,55 +180,6 @@ pub fn main() -> ExitCode {
         Command::Man(args) => shell::man(&args, Cli::command()),
     };
     finish(result.map(|()| ExitCode::SUCCESS))
-}
-
-/// Ends as clap does, but without the words of Rust's own readers of numbers.
-fn exit_with(error: &clap::Error) -> ! {
-    let Some(message) = number_wanted(error) else {
-        error.exit()
-    };
-    voice::complain(message);
-    std::process::exit(2)
-}
-
-/// What to say of an option whose value is not the number that it must be.
-fn number_wanted(error: &clap::Error) -> Option<InputError> {
-    use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
-    let text = |kind| match error.get(kind)? {
-        clap::error::ContextValue::String(text) => Some(text.as_str()),
-        _ => None,
-    };
-    let (option, value) = (
-        text(clap::error::ContextKind::InvalidArg)?,
-        text(clap::error::ContextKind::InvalidValue)?,
-    );
-    let cause = std::error::Error::source(error)?;
-    let message = if let Some(cause) = cause.downcast_ref::<ParseIntError>() {
-        let whole = value
-            .parse::<f64>()
-            .ok()
-            .filter(|n| n.fract() == 0.0 && (0.0..1e15).contains(n));
-        match (cause.kind(), whole) {
-            (IntErrorKind::PosOverflow, _) => "is too large; give a smaller number".to_owned(),
-            (_, Some(whole)) => format!("is not written as a whole number; give {whole}"),
-            _ if value.starts_with('-') => {
-                "is below zero; give a whole number, 0 or more".to_owned()
-            }
-            _ => "is not a whole number; give one, in digits alone".to_owned(),
-        }
-    } else if cause.is::<ParseFloatError>() {
-        "is not a number; give one, such as 0.5 or 2e-3".to_owned()
-    } else if let Some((_, range)) = cause.to_string().split_once(" is not in ") {
-        let (least, most) = range.split_once("..")?;
-        match most.trim_start_matches('=') {
-            "" => format!("is impossible; give {least} or more"),
-            most => format!("is impossible; give {least} to {most}"),
-        }
-    } else {
-        return None;
-    };
-    let name = option.split(' ').next().unwrap_or(option);
-    Some(InputError::new(format!("{name} {value}"), message))
 }
 
 fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {

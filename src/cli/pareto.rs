@@ -1,17 +1,14 @@
 //! `gdtof pareto`: run time against error, for each engine and knob.
 
-use std::cell::Cell;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use clap::Args;
-use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::voice::{note, notes, progress, say_json, tell};
+use super::voice::{announce, notes, progress, say_json, tell};
 use crate::chip::SensorConfig;
+use crate::engine::EngineError;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Axis, Chart, Grid, aligned, width};
 use crate::request::{self, Spelling};
@@ -84,24 +81,32 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         return Err(InputError::new("--ranges", message).into());
     }
     let results = ResultSet::begin(&args.out, "pareto")?;
-    let progress = Progress::new(settings.run_count(&methods));
+    announce(
+        "this comparison",
+        settings.processor_s(&methods) / rayon::current_num_threads() as f64,
+    );
+    let bar = progress(
+        settings.run_count(&methods) as u64,
+        "comparing {bar:40} {pos}/{len} engines and walls, {eta} left",
+    );
     let rows = (!args.json).then(|| Rows::new(&methods));
     if let Some(rows) = &rows {
-        progress.around(|| tell(head(args, &settings, cells) + &rows.headings()))?;
+        bar.suspend(|| tell(head(args, &settings, cells) + &rows.headings()))?;
     }
     let mut summaries = Vec::new();
     let mut said = Ok(());
-    let points = settings.compare(&methods, |done| match done {
-        Done::Wall => progress.step(),
+    let compared = settings.compare(&methods, |done| match done {
+        Done::Wall => bar.inc(1),
         Done::Method(points) => {
             let summary = summarise(points).expect("there is a wall");
             if let (Some(rows), Ok(())) = (&rows, &said) {
-                said = progress.around(|| tell(rows.row(&summary)));
+                said = bar.suspend(|| tell(rows.row(&summary)));
             }
             summaries.push(summary);
         }
-    })?;
-    progress.finish();
+    });
+    let points = compared.map_err(refusal)?;
+    bar.finish_and_clear();
     said?;
 
     write_cells(&results.staging().join("pareto_cells.csv"), &points)?;
@@ -131,6 +136,15 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         tell(foot(args, &settings))?;
     }
     Ok(())
+}
+
+/// An engine that refuses: all of them are compared, and none is chosen.
+fn refusal(error: EngineError) -> anyhow::Error {
+    if !error.is_refusal() {
+        return error.into();
+    }
+    let cure = "all engines are compared, so give less light (--klux, --reflectivity), longer laser cycles (--stop-periods) or another sensor";
+    InputError::new("gdtof pareto", format!("{error}; {cure}")).into()
 }
 
 fn settings(args: &ParetoArgs) -> Result<ParetoSettings, InputError> {
@@ -308,58 +322,5 @@ impl Rows {
             wall,
         ];
         aligned(&cells, &self.widths)
-    }
-}
-
-/// A bar on a terminal; lines where the messages are kept, a few a minute: this command takes minutes.
-struct Progress {
-    bar: ProgressBar,
-    is_piped: bool,
-    total: usize,
-    begin: Instant,
-    /// Walls that are done, and when that was said last.
-    state: Cell<(usize, Option<Instant>)>,
-}
-
-/// Between two lines.
-const LINE_EVERY: Duration = Duration::from_secs(10);
-
-impl Progress {
-    fn new(total: usize) -> Self {
-        let template = "comparing {bar:40} {pos}/{len} engines and walls, {eta} left";
-        let begin = Instant::now();
-        Progress {
-            bar: progress(total as u64, template),
-            is_piped: !std::io::stderr().is_terminal(),
-            total,
-            begin,
-            state: Cell::new((0, None)),
-        }
-    }
-
-    fn step(&self) {
-        self.bar.inc(1);
-        let (done, said) = self.state.get();
-        let now = Instant::now();
-        let is_due = self.is_piped && said.is_none_or(|said| now - said >= LINE_EVERY);
-        self.state
-            .set((done + 1, if is_due { Some(now) } else { said }));
-        if is_due {
-            let seconds = (now - self.begin).as_secs();
-            note(format_args!(
-                "{} of {} engines and walls after {seconds} s",
-                done + 1,
-                self.total
-            ));
-        }
-    }
-
-    /// Writes while the bar is away.
-    fn around<T>(&self, write: impl FnOnce() -> T) -> T {
-        self.bar.suspend(write)
-    }
-
-    fn finish(&self) {
-        self.bar.finish_and_clear();
     }
 }

@@ -184,17 +184,17 @@ fn silicon_table(variants: &[Variant]) -> Grid {
 }
 
 fn capacitances(args: &PowerArgs) -> Result<Capacitances, InputError> {
+    // The logic of no such chip is fed by 10 V, a pF is a thousand gates, and beyond a count a nanosecond no SPAD recovers.
     let values = [
-        ("--supply-v", args.supply_v),
-        ("--pair-ff", args.pair_ff),
-        ("--wire-ff", args.wire_ff),
-        ("--drain-ff", args.drain_ff),
-        ("--counts-hz", args.counts_hz),
+        ("--supply-v", args.supply_v, 10.0),
+        ("--pair-ff", args.pair_ff, 1e3),
+        ("--wire-ff", args.wire_ff, 1e3),
+        ("--drain-ff", args.drain_ff, 1e3),
+        ("--counts-hz", args.counts_hz, 1e9),
     ];
-    for (option, value) in values {
-        // Beyond a count a nanosecond no SPAD recovers.
-        if !(0.0..=1e9).contains(&value) {
-            let message = "is impossible; give a number from 0 to 1e9";
+    for (option, value, most) in values {
+        if !(0.0..=most).contains(&value) {
+            let message = format!("is impossible; give a number from 0 to {most}");
             return Err(InputError::new(format!("{option} {value}"), message));
         }
     }

@@ -173,9 +173,27 @@ fn asked(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
         guide_sigma_m: args.guide_sigma.clone(),
     };
     match goal.fault().or_else(|| space.fault()) {
-        Some(fault) => Err(InputError::new("what is asked", fault)),
+        Some(fault) => Err(InputError::new(option_of(&fault), fault)),
         None => Ok((goal, space)),
     }
+}
+
+/// The option that gives the setting which a complaint begins with.
+fn option_of(fault: &str) -> &'static str {
+    let options = [
+        ("range_m", "--range"),
+        ("reflectivity", "--reflectivity"),
+        ("illuminance_klux", "--klux"),
+        ("fps", "--fps"),
+        ("detection", "--detection"),
+        ("precision_m", "--precision"),
+        ("bins", "--bins"),
+        ("clk_hz", "--clk"),
+        ("thresholds", "--thresholds"),
+        ("guide_sigma_m", "--guide-sigma"),
+    ];
+    let named = options.iter().find(|(key, _)| fault.starts_with(key));
+    named.map_or("gdtof propose", |(_, option)| option)
 }
 
 /// In what areas are.

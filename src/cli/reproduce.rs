@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::voice::{busy, notes, progress, say_json, tell};
+use super::voice::{announce, busy, notes, progress, say_json, tell};
 use crate::files::{InputError, OutputFile, ResultSet};
 use crate::reproduce::{self, Report, Selection};
 
@@ -85,6 +85,10 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     });
     let begin = |folder: &PathBuf| ResultSet::begin(folder, "reproduce");
     let set = args.out.as_ref().map(begin).transpose()?;
+    announce(
+        "reproducing this",
+        selection.run_time_s(rayon::current_num_threads()),
+    );
     let bar = progress(
         selection.parts() as u64,
         "{bar:30} {pos}/{len} claims, tables, figures, measurements, {elapsed}",

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::voice::{progress, say_file, say_json, tell};
 use crate::engine::{Cohort, CohortOptions, Cycle, Expose, Replay, Window};
-use crate::files::read_text;
+use crate::files::{InputError, read_text};
 use crate::photon::SpadEvent;
 use crate::report::Grid;
 use crate::system::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
@@ -200,7 +200,9 @@ impl Figure {
 /// When a process for a figure cannot be started.
 pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     if let Some(subject) = &args.only {
-        let subject = serde_json::from_str(subject).context("no figure to measure")?;
+        let subject = serde_json::from_str(subject).map_err(|_| {
+            InputError::new("--only", "is what this program tells itself; leave it out")
+        })?;
         let figure = measure(subject, args.runs)?;
         say_file(format_args!("{}\n", serde_json::to_string(&figure)?))?;
         return Ok(());

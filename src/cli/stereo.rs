@@ -141,7 +141,7 @@ pub(super) fn cannot_match(left: &Path, right: &Path, error: &MatchError) -> Inp
             let message = format!("{error} ({}); give a rectified pair", right.display());
             return InputError::new(left.display(), message);
         }
-        MatchError::Disparities(_) => ("--disparities", "give 1 to 256"),
+        MatchError::Disparities(_) => return InputError::new("--disparities", error.to_string()),
         MatchError::OutOfImage { .. } => ("--min-disparity", "give one within the image's width"),
         MatchError::Census { .. } => ("--census", "give odd ones such as 7x7"),
         MatchError::Penalties { .. } => ("--p1, --p2", "give smaller ones, P1 first"),

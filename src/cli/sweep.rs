@@ -251,6 +251,9 @@ fn shard(text: &str) -> Result<Shard, String> {
         Some((part, of)) if (1..=of).contains(&part) && of <= 1_000_000 => {
             Ok(Shard { part: part - 1, of })
         }
-        _ => Err("give a part and the number of parts, as 3/16".to_owned()),
+        _ => Err(
+            "is not a part of a study; give a part and the number of parts, such as 3/16"
+                .to_owned(),
+        ),
     }
 }

@@ -5,7 +5,7 @@
 //! | [`complain`] | standard error | yes |
 //! | [`say_json`], [`say_file`]: what a program or a file takes | standard output | yes |
 //! | [`tell`]: tables and sentences about what was done | standard output | no |
-//! | [`note`], [`aside`] | standard error | no |
+//! | [`note`], [`announce`], [`aside`] | standard error | no |
 //! | [`progress`], [`busy`] | standard error, if it is a terminal | no |
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -82,6 +82,21 @@ pub(super) fn complain(text: impl Display) {
 pub(super) fn note(text: impl Display) {
     if !is_quiet() {
         eprintln!("gdtof: {text}");
+    }
+}
+
+/// Runs that take longer say so before they begin.
+const LONG_S: f64 = 5.0;
+
+/// Says how long something takes, if that is long.
+pub(super) fn announce(what: &str, seconds: f64) {
+    if seconds > LONG_S {
+        let time = match seconds < 120.0 {
+            true => format!("{seconds:.0} s"),
+            false => format!("{:.0} minutes", seconds / 60.0),
+        };
+        let threads = counted(rayon::current_num_threads() as u64, "thread");
+        note(format_args!("{what} takes about {time} on {threads}"));
     }
 }
 

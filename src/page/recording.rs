@@ -67,8 +67,15 @@ impl Recording {
         if drive.is_file() {
             return of_drive(folder, &drive, every);
         }
-        let message = format!("has neither frame.json nor drive.json; give {WANTED}");
-        Err(InputError::new(folder.display(), message))
+        let what = if folder.is_file() {
+            "is a file"
+        } else {
+            "has neither frame.json nor drive.json"
+        };
+        Err(InputError::new(
+            folder.display(),
+            format!("{what}; give {WANTED}"),
+        ))
     }
 }
 

@@ -118,11 +118,13 @@ impl Candidate {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Limit {
     /// The P-counter does not reach so far.
-    #[error("a P-counter of {bits} bits ends {short_m:.1} m short of the target and its window")]
+    #[error(
+        "a P-counter of {bits} bits ends {short_m:.1} m short of the target and its window; give more bits, a slower clock or a nearer target"
+    )]
     Reach { bits: usize, short_m: f64 },
     /// The best window holds the target too seldom.
     #[error(
-        "the guide: its error of {guide_sigma_m} m leaves the target in a window of {window_m:.1} m in {:.2} % of frames, where more than {:.2} % are asked for",
+        "the guide: its error of {guide_sigma_m} m leaves the target in a window of {window_m:.1} m in {:.2} % of frames, where more than {:.2} % are asked for; give a better guide, more bins or a slower clock",
         100.0 * share, 100.0 * detection
     )]
     Guide {
@@ -132,7 +134,9 @@ pub enum Limit {
         detection: f64,
     },
     /// No number of laser cycles finds the target.
-    #[error("light: {most} laser cycles do not find the target")]
+    #[error(
+        "light: {most} laser cycles do not find the target; give more energy, a wider lens or a nearer target"
+    )]
     Light { most: u32 },
     /// A pulse blinds the SPADs.
     #[error(
@@ -140,7 +144,7 @@ pub enum Limit {
     )]
     Blinding { photons: f64 },
     /// The chip is too slow, or its verdict says what else.
-    #[error("static timing at {mhz} MHz {why}")]
+    #[error("static timing at {mhz} MHz {why}; give another clock")]
     Timing { mhz: f64, why: String },
     /// Eyes.
     #[error(
@@ -154,12 +158,12 @@ pub enum Limit {
     },
     /// Frames are too short.
     #[error(
-        "time: a frame is {times:.1} times too short for {laser_cycles} laser cycles and the readout"
+        "time: a frame is {times:.1} times too short for {laser_cycles} laser cycles and the readout; give fewer frames a second"
     )]
     Time { times: f64, laser_cycles: u32 },
     /// Theory has designs, and engines see less.
     #[error(
-        "the check on cohort: the nearest design is found in {:.2} % of frames to {precision_m:.4} m, where {:.2} % and {precision_goal_m} m are asked for",
+        "the check on cohort: the nearest design is found in {:.2} % of frames to {precision_m:.4} m, where {:.2} % and {precision_goal_m} m are asked for; ask for less, or give a wider choice",
         100.0 * detection, 100.0 * detection_goal
     )]
     Unconfirmed {
@@ -169,7 +173,9 @@ pub enum Limit {
         precision_goal_m: f64,
     },
     /// Bins overflow.
-    #[error("bins: the fullest has {times:.1} times the counts that {bits} bits hold")]
+    #[error(
+        "bins: the fullest has {times:.1} times the counts that {bits} bits hold; give less energy or less light"
+    )]
     Counts { times: f64, bits: usize },
 }
 

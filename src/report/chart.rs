@@ -291,10 +291,12 @@ impl Chart {
     /// # Errors
     /// When one of the files cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), InputError> {
-        OutputFile::write_text(path, &self.svg())?;
         let numbers = path.with_extension("csv");
+        let svg = OutputFile::prepared(path, |out| out.write_all(self.svg().as_bytes()))?;
+        let csv = OutputFile::prepared(&numbers, |out| self.write_csv(out))?;
         set_aside_foreign(&numbers, begins_with(&self.csv_headings()))?;
-        OutputFile::write_with(&numbers, |out| self.write_csv(out))
+        svg.commit()?;
+        csv.commit()
     }
 
     fn csv_headings(&self) -> String {

@@ -1,5 +1,6 @@
 //! What is chosen to be reproduced.
 
+use super::measured::FRAMES;
 use super::registry::{CLAIMS, FIGURES, MEASUREMENTS, TABLES};
 use crate::settings::words;
 
@@ -40,6 +41,24 @@ impl Selection {
         self.claims.len() + self.figures.len() + self.tables.len() + self.measurements.len()
     }
 
+    /// About how long this many threads take, s. Parts are made side by side, so none takes less than its longest.
+    pub(crate) fn run_time_s(&self, threads: usize) -> f64 {
+        let frames = self.frames.unwrap_or(FRAMES) as f64 / FRAMES as f64;
+        let parts = LONG_S.iter().filter_map(|&(part, number, seconds)| {
+            let (chosen, times) = match part {
+                Part::Claim => (&self.claims, 1.0),
+                Part::Figure => (&self.figures, 1.0),
+                Part::Table => (&self.tables, 1.0),
+                Part::Measurement => (&self.measurements, frames),
+            };
+            chosen.contains(&number).then_some(seconds * times)
+        });
+        let (sum, longest) = parts.fold((0.0, 0.0), |(sum, longest): (f64, f64), seconds| {
+            (sum + seconds, longest.max(seconds))
+        });
+        longest.max(sum / threads as f64)
+    }
+
     /// Whether everything that is chosen exists.
     ///
     /// # Errors
@@ -64,6 +83,28 @@ impl Selection {
         Ok(())
     }
 }
+
+/// Parts that take more than 3 s of processor time, each by itself in the release build.
+const LONG_S: [(Part, u32, f64); 18] = [
+    (Part::Claim, 5, 7.0),
+    (Part::Claim, 14, 6.0),
+    (Part::Claim, 15, 9.0),
+    (Part::Claim, 19, 33.0),
+    (Part::Claim, 22, 11.0),
+    (Part::Claim, 23, 3.0),
+    (Part::Claim, 24, 15.0),
+    (Part::Figure, 42, 8.0),
+    (Part::Figure, 43, 6.0),
+    (Part::Figure, 44, 9.0),
+    (Part::Figure, 45, 10.0),
+    (Part::Figure, 104, 3.0),
+    (Part::Figure, 108, 9.0),
+    (Part::Figure, 109, 9.0),
+    (Part::Measurement, 1, 4.0),
+    (Part::Measurement, 2, 7.0),
+    (Part::Measurement, 3, 5.0),
+    (Part::Measurement, 4, 12.0),
+];
 
 words! {
     /// What can be reproduced.
@@ -127,5 +168,36 @@ mod tests {
             "{message}"
         );
         assert!(Selection::all().check().is_ok());
+    }
+
+    #[test]
+    fn run_times_are_those_of_what_is_chosen() {
+        let one = |claims: &[u32]| Selection {
+            claims: claims.to_vec(),
+            ..Selection::default()
+        };
+        assert!(one(&[1]).run_time_s(2) < 1.0);
+        let longest = one(&[19]).run_time_s(8);
+        assert!((one(&[19, 24]).run_time_s(8) - longest).abs() < 1e-9);
+        assert!(one(&[19, 24]).run_time_s(1) > longest);
+        let measured = Selection {
+            measurements: vec![4],
+            ..Selection::default()
+        };
+        let of_more = Selection {
+            frames: Some(3000),
+            ..measured.clone()
+        };
+        assert!(of_more.run_time_s(2) > 9.0 * measured.run_time_s(2));
+        let all = Selection::all();
+        assert!(LONG_S.iter().all(|(part, number, _)| {
+            let numbers = match part {
+                Part::Claim => &all.claims,
+                Part::Figure => &all.figures,
+                Part::Table => &all.tables,
+                Part::Measurement => &all.measurements,
+            };
+            numbers.contains(number)
+        }));
     }
 }

@@ -19,6 +19,7 @@ pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate, r
 pub use self::frame_files::{Exposed, FrameConfiguration, FrameReport, write_frame};
 pub(crate) use self::frame_files::{eye_safety_of, frame_s, variance_left_out_of};
 pub use self::sources::Sources;
+pub(crate) use self::sources::{ReadAs, refuse_other_kind};
 pub use self::spelling::Spelling;
 pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};
 

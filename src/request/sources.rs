@@ -150,11 +150,16 @@ fn is_name(path: &Path) -> bool {
 fn scene_document(path: &Path, spelling: Spelling) -> Result<Document, InputError> {
     if !is_name(path) {
         let document = Document::load(path)?;
-        refuse_other(&document, path, Kind::Scene, spelling)?;
+        refuse_other_kind(&document, ReadAs::Scene, spelling)?;
         return Ok(document);
     }
     if path.to_str().and_then(Sensor::named).is_some() {
-        return Err(is_other(path, Kind::Sensor, spelling));
+        return Err(is_other(
+            path.display(),
+            ReadAs::Sensor,
+            ReadAs::Scene,
+            spelling,
+        ));
     }
     let named = path.to_str().and_then(Scene::built_in_document);
     named.ok_or_else(|| {
@@ -166,28 +171,30 @@ fn scene_document(path: &Path, spelling: Spelling) -> Result<Document, InputErro
 }
 
 /// Refuses settings that are those of something else.
-fn refuse_other(
+///
+/// # Errors
+/// When they are.
+pub(crate) fn refuse_other_kind(
     document: &Document,
-    path: &Path,
-    wanted: Kind,
+    wanted: ReadAs,
     spelling: Spelling,
 ) -> Result<(), InputError> {
     match kind_of(&document.table) {
-        Some(kind) if kind != wanted => Err(is_other(path, kind, spelling)),
+        Some(kind) if kind != wanted => Err(is_other(document.source(), kind, wanted, spelling)),
         _ => Ok(()),
     }
 }
 
 /// What a settings file describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(crate) enum ReadAs {
     Sensor,
     Scene,
     Study,
 }
 
 /// What the keys at the root are those of, if they are all of one kind.
-fn kind_of(table: &toml::Table) -> Option<Kind> {
+fn kind_of(table: &toml::Table) -> Option<ReadAs> {
     let is_section = |name: &String| {
         let value = &table[name];
         let is_table = value.is_table() || value.is_array();
@@ -197,35 +204,55 @@ fn kind_of(table: &toml::Table) -> Option<Kind> {
     if table.is_empty() {
         None
     } else if table.keys().all(is_section) {
-        Some(Kind::Scene)
+        Some(ReadAs::Scene)
     } else if table.keys().all(is_of_study) {
-        Some(Kind::Study)
+        Some(ReadAs::Study)
     } else if table.keys().all(|name| SensorConfig::key(name).is_some()) {
-        Some(Kind::Sensor)
+        Some(ReadAs::Sensor)
     } else {
         None
     }
 }
 
-fn is_other(path: &Path, kind: Kind, spelling: Spelling) -> InputError {
+fn is_other(
+    source: impl std::fmt::Display,
+    kind: ReadAs,
+    wanted: ReadAs,
+    spelling: Spelling,
+) -> InputError {
     let (what, key) = match kind {
-        Kind::Sensor => ("a sensor", "sensor"),
-        Kind::Scene => ("a scene", "scene"),
-        Kind::Study => return InputError::new(path.display(), "is a study; `gdtof sweep` runs it"),
+        ReadAs::Sensor => ("a sensor", "sensor"),
+        ReadAs::Scene => ("a scene", "scene"),
+        ReadAs::Study => return InputError::new(source, "is a study; `gdtof sweep` runs it"),
     };
-    let message = format!("is {what}; give it as {}", spelling.name(key));
-    InputError::new(path.display(), message)
+    let message = match wanted {
+        ReadAs::Study => {
+            format!("is {what}; name it in a study, as {key} = \"FILE\" below [fixed]")
+        }
+        _ => format!("is {what}; give it as {}", spelling.name(key)),
+    };
+    InputError::new(source, message)
 }
 
 /// A sensor file, or the description of a chip that is known by name. A file of such a name comes first.
 fn described(path: &Path, spelling: Spelling) -> Result<Document, InputError> {
     if !is_name(path) {
         let document = Document::load(path)?;
-        refuse_other(&document, path, Kind::Sensor, spelling)?;
+        if document.table.is_empty() {
+            let message =
+                "has no settings; give at least one, or leave the sensor out for quantic4x4";
+            return Err(InputError::new(path.display(), message));
+        }
+        refuse_other_kind(&document, ReadAs::Sensor, spelling)?;
         return Ok(document);
     }
     if path.to_str().and_then(Scene::built_in_document).is_some() {
-        return Err(is_other(path, Kind::Scene, spelling));
+        return Err(is_other(
+            path.display(),
+            ReadAs::Scene,
+            ReadAs::Sensor,
+            spelling,
+        ));
     }
     let chip = path.to_str().and_then(Sensor::named).ok_or_else(|| {
         let instead = instead_of(&path.to_string_lossy(), CHIPS.map(|(name, _)| name));

@@ -8,7 +8,9 @@ use super::design::{self, Design};
 use super::values::{Axis, Values, Varied};
 use crate::settings::words;
 
+mod files;
 mod reading;
+mod varied;
 
 words! {
     /// What is made of each point.

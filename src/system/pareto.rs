@@ -20,6 +20,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 pub use errors::Errors;
+use method::MEASURED_PERIODS;
 pub use method::{GATE_CYCLES, Method};
 pub use summary::{Summary, Worst, summarise};
 
@@ -198,6 +199,22 @@ impl ParetoSettings {
     pub fn run_count(&self, methods: &[Method]) -> usize {
         let others = methods.iter().filter(|&&m| m != Method::Cycle).count();
         self.cell_count() * (others + 1)
+    }
+
+    /// About how much processor time the comparison takes, s.
+    pub fn processor_s(&self, methods: &[Method]) -> f64 {
+        let periods = f64::from(self.stop_periods) / MEASURED_PERIODS;
+        let runs = self.macropixels as f64 * self.repeats as f64 * periods;
+        let cells = self.cells();
+        let run_times_s = methods.iter().flat_map(|&method| {
+            let cycles = f64::from(self.cycles_of(method));
+            let [dark_ns, each_klux_ns] = method.processor_ns();
+            let cell_ns = move |cell: &Cell| dark_ns + each_klux_ns * cell.illuminance_klux;
+            cells
+                .iter()
+                .map(move |cell| runs * cycles * cell_ns(cell) * 1e-9)
+        });
+        run_times_s.sum()
     }
 
     /// Runs every method on every cell, method after method; `done` is called after each wall and each method.

@@ -1,4 +1,4 @@
-//! Full disks and signals, of all commands that write: one sentence, and nothing half written.
+//! Full disks and signals, of all commands that write: one sentence, nothing half written, and what was there before stays.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use super::every_command::{RUNS, words, workplace};
 
-/// Commands that write no file, and those that take minutes (`runs_survive_faults` has a demo).
-const OTHERS: [&str; 8] = [
+/// Commands that write no file.
+const WITHOUT_FILES: [&str; 7] = [
     "speed",
     "doctor",
     "sensor",
@@ -16,47 +16,103 @@ const OTHERS: [&str; 8] = [
     "schema",
     "completion",
     "power",
-    "demo",
+];
+
+/// Words that let a command write, or write more, beside those that let it run.
+const MORE: [(&str, &str); 9] = [
+    ("frame", "--page --probe 0,0"),
+    ("drive", "--mcap"),
+    ("replay", "--out h.npy"),
+    (
+        "replay",
+        "--out h.csv --engine gate --vcd r.vcd --saif r.saif --checks report --checks-json r.json",
+    ),
+    ("reproduce", "--out reproduced"),
+    ("range", "--out depths.csv --save-calibration zones.json"),
+    ("timing", "--mismatch 0.05 --plot ripple.svg"),
+    (
+        "export verilog",
+        "--inits inits.csv --events events.csv --cols 2 --stop-periods 100 --laser-cycles 5",
+    ),
+    ("sweep", "--plot theory.laser_cycles,p_right"),
 ];
 
 /// Commands that write, with words that let them.
-fn writing() -> impl Iterator<Item = Vec<String>> {
+fn writing() -> Vec<Vec<String>> {
+    let mut all = Vec::new();
     let names = RUNS.iter().map(|(name, ..)| *name);
-    names.filter(|name| !OTHERS.contains(name)).map(|name| {
-        let more = match name {
-            "replay" => "--out h.npy",
-            "reproduce" => "--out reproduced",
-            "range" => "--out depths.csv",
-            "timing" => "--mismatch 0.05 --plot ripple.svg",
-            _ => "",
-        };
-        let mut words = words(name);
-        words.extend(more.split_whitespace().map(str::to_owned));
-        words.push("--quiet".into());
-        words
-    })
+    for name in names.filter(|name| !WITHOUT_FILES.contains(name)) {
+        let more: Vec<&str> = MORE
+            .iter()
+            .filter(|(known, _)| *known == name)
+            .map(|(_, more)| *more)
+            .collect();
+        // Those that write without further words.
+        let plain = !["replay", "reproduce", "range", "timing"].contains(&name);
+        for more in plain.then_some("").into_iter().chain(more) {
+            let mut words = words(name);
+            let more: Vec<&str> = more.split_whitespace().collect();
+            for option in more.iter().filter(|word| word.starts_with("--")) {
+                if let Some(at) = words.iter().position(|word| word == option) {
+                    words.drain(at..at + 2);
+                }
+            }
+            words.extend(more.into_iter().map(str::to_owned));
+            words.push("--quiet".into());
+            all.push(words);
+        }
+    }
+    all
 }
 
-fn files(folder: &Path) -> BTreeMap<String, u64> {
+/// Every file and folder below a folder, with its contents. A sweep's journal keeps rows that were taken, for the next run.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let path = entry.path();
-        found.insert(path.display().to_string(), entry.metadata().unwrap().len());
+        let name = path.display().to_string();
         if path.is_dir() {
-            found.extend(files(&path));
+            found.extend(contents(&path));
+            found.insert(name, Vec::new());
+        } else if !name.contains("/journal") {
+            found.insert(name, std::fs::read(path).unwrap());
         }
     }
     found
 }
 
+/// Names of what is not the same in both.
+fn differences(one: &BTreeMap<String, Vec<u8>>, other: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
+    let names = one.keys().chain(other.keys());
+    let differing = names.filter(|name| one.get(*name) != other.get(*name));
+    differing.cloned().collect()
+}
+
+fn gdtof(here: &Path, words: &[String]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
+    command.args(words).current_dir(here);
+    command
+}
+
+/// Without and with an older set in the place of the results.
 #[test]
 fn a_full_disk_is_one_sentence_and_changes_nothing() {
     let dir = workplace();
     let here = dir.path();
     for words in writing() {
-        // The disk is full at once, and after 2 KiB of a file.
-        for blocks in [0, 4] {
-            let before = files(here);
+        // A demo takes half a minute.
+        let moments: &[(bool, u32)] = if words[0] == "demo" {
+            &[(false, 0)]
+        } else {
+            // The disk is full at once, and after 2 KiB of a file.
+            &[(false, 0), (false, 4), (true, 0), (true, 4)]
+        };
+        for &(has_older, blocks) in moments {
+            if has_older {
+                let run = gdtof(here, &words).output().unwrap();
+                assert!(run.status.success(), "{words:?}: {run:?}");
+            }
+            let before = contents(here);
             let script =
                 format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\" --threads 2");
             let run: Output = Command::new("sh")
@@ -65,52 +121,75 @@ fn a_full_disk_is_one_sentence_and_changes_nothing() {
                 .current_dir(here)
                 .output()
                 .unwrap();
+            let error = String::from_utf8_lossy(&run.stderr);
+            // What is there already, byte for byte, need not be written.
             if run.status.success() {
-                assert!(blocks > 0, "{words:?} wrote nothing");
+                assert!(blocks > 0 || has_older, "{words:?} wrote nothing");
                 continue;
             }
-            let error = String::from_utf8_lossy(&run.stderr);
             assert_eq!(run.status.code(), Some(2), "{words:?}: {error}");
             assert_eq!(error.lines().count(), 1, "{words:?}: {error}");
             assert!(error.contains("free some space"), "{words:?}: {error}");
             assert!(!error.contains(".gdtof-"), "{words:?}: {error}");
-            // Rows that were taken stay in a journal, for the next run.
-            let is_result = |name: &&String| !name.contains("/sweep-study");
-            let names = |files: &BTreeMap<String, u64>| -> Vec<String> {
-                files.keys().filter(is_result).cloned().collect()
-            };
-            assert_eq!(names(&files(here)), names(&before), "{words:?}");
+            let mut changed = differences(&before, &contents(here));
+            // The folder of a sweep and its study are made before the first row is taken.
+            changed.retain(|name| has_older || !name.contains("/sweep-study"));
+            assert_eq!(changed, [""; 0], "{words:?}, older set: {has_older}");
         }
     }
 }
 
 #[test]
 fn a_signal_leaves_no_half_of_a_file() {
+    use std::os::unix::process::ExitStatusExt;
     let dir = workplace();
     let here = dir.path();
     for words in writing() {
-        for milliseconds in [3, 30, 300] {
-            let mut child = Command::new(env!("CARGO_BIN_EXE_gdtof"))
-                .args(&words)
-                .current_dir(here)
+        if words[0] != "demo" {
+            let run = gdtof(here, &words).output().unwrap();
+            assert!(run.status.success(), "{words:?}: {run:?}");
+        }
+        for (milliseconds, signal, number) in [
+            (3, "INT", 2),
+            (30, "TERM", 15),
+            (100, "HUP", 1),
+            (300, "TERM", 15),
+        ] {
+            let before = contents(here);
+            let mut child = gdtof(here, &words)
                 .stdout(Stdio::null())
                 .stderr(Stdio::null())
                 .spawn()
                 .unwrap();
             std::thread::sleep(Duration::from_millis(milliseconds));
-            let kill = format!("kill -TERM {}", child.id());
+            let kill = format!("kill -{signal} {}", child.id());
             let _ = Command::new("sh")
                 .args(["-c", &kill])
                 .stderr(Stdio::null())
                 .status();
             let status = child.wait().unwrap();
             // The first moments are those of the system's own end by a signal.
-            use std::os::unix::process::ExitStatusExt;
-            let is_ended = status.code() == Some(143) || status.signal() == Some(15);
+            let is_ended = status.code() == Some(128 + number) || status.signal() == Some(number);
             assert!(is_ended || status.success(), "{words:?}: {status}");
-            let left = files(here);
-            let left = left.keys().find(|name| name.contains("/.gdtof-"));
+            let after = contents(here);
+            let left = after.keys().find(|name| name.contains("/.gdtof-"));
             assert_eq!(left, None, "{words:?}");
+            if status.success() {
+                continue;
+            }
+            let mut changed = differences(&before, &after);
+            // Empty folders of results are left.
+            changed.retain(|name| !Path::new(name).is_dir());
+            // The signal may come after the results, which are whole then.
+            let manifest = changed.iter().find(|name| name.ends_with("/manifest.json"));
+            let is_whole = manifest.is_some_and(|name| {
+                let manifest: serde_json::Value = serde_json::from_slice(&after[name]).unwrap();
+                manifest["complete"] == true
+            });
+            assert!(
+                changed.is_empty() || is_whole,
+                "{words:?}, {signal} after {milliseconds} ms: {changed:?}"
+            );
         }
     }
 }

@@ -18,6 +18,8 @@ mod engines_are_chosen_from_the_command_line;
 mod every_command;
 #[cfg(unix)]
 mod every_command_leaves_whole_files;
+#[cfg(unix)]
+mod every_path;
 mod files_of_others_are_kept;
 mod frames_for_other_tools;
 mod golden_vectors_hold;
@@ -54,3 +56,7 @@ mod the_same_everywhere;
 mod wave_replays_a_cycle;
 #[cfg(unix)]
 mod what_is_too_much_is_refused_first;
+#[cfg(unix)]
+mod wrong_files_are_named;
+#[cfg(unix)]
+mod wrong_words_are_named;

@@ -270,3 +270,86 @@ fn help_texts_are_whole() {
     let help = String::from_utf8(help.stdout).unwrap();
     assert!(!help.contains("none for the camera pair"), "{help}");
 }
+
+/// What was meant as something else, tried by hand.
+#[test]
+fn a_file_in_the_place_of_a_folder_and_the_like_are_named() {
+    let dir = folder();
+    let here = dir.path();
+    for (words, says) in [
+        (
+            "frame --out picture.png",
+            "gdtof: picture.png: is not a folder; give the name of one",
+        ),
+        (
+            "man --out picture.png",
+            "gdtof: picture.png: is not a folder; give the name of one",
+        ),
+        (
+            "sweep study.toml --out picture.png",
+            "gdtof: picture.png: is not a folder; give the name of one",
+        ),
+        (
+            "page taken/frame.json",
+            "gdtof: taken/frame.json: is a file; give a folder that",
+        ),
+        (
+            "export frame swept",
+            "gdtof: swept: has no frame.json; give a folder that",
+        ),
+        (
+            "frame --guide file:path=",
+            "\"\": is no name of a file; give one",
+        ),
+        (
+            "timing --liberty example.lib,example.lib",
+            "example.lib:31: the cell INV_1 is in example.lib as well; leave one of both files out",
+        ),
+        (
+            "timing --liberty picture.png",
+            "picture.png: is not text; give a Liberty file",
+        ),
+        (
+            "frame --set scene.lidar.pulse=picture.png",
+            "pulse: `picture.png` is impossible; give gaussian, pairs of time in ns and power, or a .csv file",
+        ),
+        (
+            "frame --set scene.lidar.pulse=gausian",
+            "did you mean `gaussian`?",
+        ),
+        (
+            "propose --range 0 --reflectivity 0.5 --klux 1 --fps 10",
+            "gdtof: --range: range_m = 0 is impossible; give 0.5 to 10000 m",
+        ),
+        (
+            "power --supply-v 10000",
+            "gdtof: --supply-v 10000: is impossible; give a number from 0 to 10",
+        ),
+        (
+            "sweep scene.toml",
+            "gdtof: scene.toml: is a scene; name it in a study, as scene = \"FILE\" below [fixed]",
+        ),
+        (
+            "sweep x.toml",
+            "gdtof: x.toml: is a sensor; name it in a study, as sensor = \"FILE\" below [fixed]",
+        ),
+        (
+            "pareto --sensor x.toml --macropixels 1 --repeats 1 --laser-cycles 2 --no-gate --reflectivity 1 --klux 100 --set scene.lidar.lens_diameter_mm=40",
+            "gdtof pareto: ",
+        ),
+    ] {
+        let words: Vec<&str> = words.split(' ').collect();
+        let (status, error) = said(here, &words);
+        assert_eq!(status, Some(2), "{words:?}: {error}");
+        assert!(error.contains(says), "{words:?}: {error}");
+        assert_eq!(error.trim_end().lines().count(), 1, "{error}");
+    }
+    std::fs::write(here.join("nothing.toml"), "# nothing yet\n").unwrap();
+    for words in ["sensor --sensor", "frame --scene", "sweep"] {
+        let words: Vec<&str> = words.split(' ').chain(["nothing.toml"]).collect();
+        let (status, error) = said(here, &words);
+        assert_eq!(status, Some(2), "{words:?}: {error}");
+        let says = "gdtof: nothing.toml: has no settings; give ";
+        assert!(error.starts_with(says), "{words:?}: {error}");
+    }
+}

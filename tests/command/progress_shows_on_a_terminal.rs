@@ -1,5 +1,6 @@
-//! How far a run is: on a terminal, and nowhere else.
+//! How far a run is: on a terminal, and nowhere else. How long it will take: in the first line of standard error.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -69,5 +70,35 @@ fn long_runs_say_how_far_they_are() {
             .unwrap();
         let noted = String::from_utf8_lossy(&piped.stderr);
         assert!(!noted.contains(says), "{words:?}: {noted}");
+    }
+}
+
+#[test]
+fn long_runs_say_first_how_long_they_take() {
+    let dir = workplace();
+    for (words, says) in [
+        ("reproduce", "gdtof: reproducing this takes about "),
+        ("pareto", "gdtof: this comparison takes about "),
+        ("demo van", "gdtof: van takes about "),
+        (
+            "drive --rows 2 --cols 2 --laser-cycles 2 --no-pictures --frames 100000",
+            "gdtof: the rest of the drive takes about ",
+        ),
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_gdtof"))
+            .args(words.split(' '))
+            .args(["--threads", "1"])
+            .current_dir(dir.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        let mut said = BufReader::new(child.stderr.take().unwrap());
+        said.read_line(&mut line).unwrap();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(line.starts_with(says), "{words}: {line}");
+        assert!(line.ends_with(" on 1 thread\n"), "{words}: {line}");
     }
 }

@@ -122,11 +122,7 @@ fn a_piped_comparison_says_how_far_it_is_and_what_differs() {
     }
     assert!(!table.lines().any(|line| line.starts_with("gate")));
     let messages = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        messages.starts_with("gdtof: 1 of 16 engines and walls"),
-        "{messages}"
-    );
-    assert!(!messages.contains('\x1b'), "{messages}");
+    assert_eq!(messages, "");
 }
 
 /// A row of macropixels at 384 MHz in ever brighter light, echo in the middle of each window.

@@ -1,5 +1,6 @@
 //! What is wrong with something the user gave, in one sentence that an editor can jump to.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -50,6 +51,9 @@ pub fn instead_of<'k>(given: &str, known: impl IntoIterator<Item = &'k str>) -> 
 
 /// An error of the system without its number.
 pub fn in_words(error: &io::Error) -> String {
+    if error.kind() == io::ErrorKind::UnexpectedEof {
+        return "it ends early".to_owned();
+    }
     let said = error.to_string();
     match said.rsplit_once(" (os error ") {
         Some((words, number)) if number.ends_with(')') => words.to_owned(),
@@ -57,25 +61,37 @@ pub fn in_words(error: &io::Error) -> String {
     }
 }
 
-/// Most characters of a source before the middle is left out.
-const LONGEST_SOURCE: usize = 160;
+/// Most characters of a source, or of a word of a message, before the middle is left out.
+const LONGEST_WORD: usize = 160;
+
+/// Most characters of a message. Those of the program have fewer; what they quote of the user's need not.
+const LONGEST_MESSAGE: usize = 480;
+
+/// `text` without its middle, if it has more than `most` characters.
+fn without_middle(text: &str, most: usize) -> Cow<'_, str> {
+    let length = text.chars().count();
+    if length <= most {
+        return text.into();
+    }
+    let head = text.chars().take(most / 4);
+    let tail = text.chars().skip(length - most * 3 / 4);
+    head.chain(['…']).chain(tail).collect()
+}
 
 /// A path or an option as a sentence has room for it, without the folder in which results are prepared.
 fn shortened(source: &str) -> String {
     let is_staging = |part: &&str| !part.starts_with(".gdtof-");
     let parts: Vec<&str> = source.split('/').filter(is_staging).collect();
-    let source = parts.join("/");
-    let characters: Vec<char> = source.chars().collect();
-    if characters.len() <= LONGEST_SOURCE {
-        return source;
-    }
-    let of = |part: &[char]| part.iter().collect::<String>();
-    let (head, tail) = (LONGEST_SOURCE / 4, LONGEST_SOURCE * 3 / 4);
-    format!(
-        "{}…{}",
-        of(&characters[..head]),
-        of(&characters[characters.len() - tail..])
-    )
+    without_middle(&parts.join("/"), LONGEST_WORD).into_owned()
+}
+
+/// A message as a line has room for it, whatever it quotes.
+fn in_room(message: &str) -> String {
+    let words: Vec<_> = message
+        .split(' ')
+        .map(|word| without_middle(word, LONGEST_WORD))
+        .collect();
+    without_middle(&words.join(" "), LONGEST_MESSAGE).into_owned()
 }
 
 /// Text in one line: a terminal does nothing but show it.
@@ -99,7 +115,7 @@ impl fmt::Display for InputError {
         if let Some(line) = self.line {
             write!(f, ":{line}")?;
         }
-        write!(f, ": {}", Escaped(&self.message))?;
+        write!(f, ": {}", Escaped(&in_room(&self.message)))?;
         self.further.iter().try_for_each(|e| write!(f, "\n{e}"))
     }
 }
@@ -208,10 +224,23 @@ mod tests {
         let long = said(&("d/".repeat(1000) + "end.toml"));
         assert!(long.chars().count() < 180 && long.contains("…"), "{long}");
         assert!(long.contains("/end.toml"), "{long}");
+        let quoted = |text: &str| {
+            let said = InputError::new("x", format!("{text:?} is no word; give a or b"));
+            said.to_string()
+        };
+        let long = quoted(&"y".repeat(20_000));
+        assert!(long.chars().count() < 200, "{long}");
+        assert!(long.ends_with("is no word; give a or b"), "{long}");
+        let long = quoted(&"y ".repeat(20_000));
+        assert!(long.chars().count() < 510, "{long}");
+        assert!(long.ends_with("is no word; give a or b"), "{long}");
     }
 
     #[test]
-    fn errors_of_the_system_have_no_number() {
+    fn errors_of_the_system_are_in_our_words() {
+        let mut short: &[u8] = b"a";
+        let error = io::Read::read_exact(&mut short, &mut [0; 2]).unwrap_err();
+        assert_eq!(in_words(&error), "it ends early");
         let missing = io::Error::from_raw_os_error(2);
         let said = InputError::unreadable(Path::new("x"), &missing).to_string();
         assert!(

@@ -223,14 +223,15 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         }
     };
     let depth = |s: &Sighting| calibration.depth_m(&s.echo);
+    let mut files = Vec::new();
     if let Some(path) = &args.save_calibration {
-        OutputFile::write_with(path, |out| {
+        files.push(OutputFile::prepared(path, |out| {
             serde_json::to_writer_pretty(&mut *out, &calibration)?;
             writeln!(out)
-        })?;
+        })?);
     }
     if let Some(path) = &args.out {
-        OutputFile::write_with(path, |out| {
+        files.push(OutputFile::prepared(path, |out| {
             writeln!(out, "capture,zone,true_m,depth_m,sensor_m")?;
             for s in &reported {
                 let (capture, zone) = (captures[s.capture].capture, s.echo.zone);
@@ -241,8 +242,9 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
                 )?;
             }
             Ok(())
-        })?;
+        })?);
     }
+    files.into_iter().try_for_each(OutputFile::commit)?;
     let report = Report {
         captures: captures.len(),
         zones,

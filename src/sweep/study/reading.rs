@@ -2,18 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
 use toml::{Table, Value};
 
+use super::files::{name_of, with_files_named};
+use super::varied::varied;
 use super::{Kind, MOST_POINTS, Study};
-use crate::files::{InputError, Misfit, in_plain_words, instead_of};
+use crate::files::{InputError, instead_of};
+use crate::request::{ReadAs, Spelling, refuse_other_kind};
 use crate::settings::Range::Within;
 use crate::settings::{Document, Fault, Section, Settings, keys, schema, words};
-use crate::sweep::cell::{Column, Holds};
 use crate::sweep::design::{Design, MOST_SOBOL_AXES};
-use crate::sweep::keys::{self as names, Known};
+use crate::sweep::keys as names;
 use crate::sweep::theory::Asked;
-use crate::sweep::values::{Axis, Span, Values, Varied};
+use crate::sweep::values::{Axis, Varied};
 
 words! {
     /// Words for [`Design`].
@@ -42,25 +43,6 @@ keys! {
         /// How often each point is taken, with successive seeds.
         replicas: u64 = 1, in Within(1.0, 1e6);
     }
-}
-
-/// A range, as a study writes it.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RangeEntry {
-    from: Value,
-    to: Value,
-    steps: Option<u32>,
-    #[serde(default)]
-    scale: Scale,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Scale {
-    #[default]
-    Linear,
-    Log,
 }
 
 impl Study {
@@ -122,7 +104,12 @@ impl Study {
         folder: &Path,
         name: &str,
     ) -> Result<Self, InputError> {
-        let document = Document::parse(&source, &with_files_beside_keys(text))?;
+        let document = Document::parse(&source, &with_files_named(text))?;
+        if document.table.is_empty() {
+            let message = "has no settings; give what varies, below [vary]";
+            return Err(InputError::new(source, message));
+        }
+        refuse_other_kind(&document, ReadAs::Study, Spelling::Options)?;
         let mut faults = Vec::new();
         let mut fault = |path: &str, message: String| {
             let path = path.to_owned();
@@ -161,7 +148,7 @@ impl Study {
         let mut assignments = Vec::new();
         flatten("", fixed, &mut |name, value| {
             let path = format!("fixed.{name}");
-            let name = name.trim_end_matches('.');
+            let name = name_of(name);
             match names::find(head.kind, name).and_then(|known| names::checked(&known, value)) {
                 Ok(value) => assignments.push((name.to_owned(), value)),
                 Err(message) => fault(&path, message),
@@ -392,103 +379,6 @@ fn flatten(prefix: &str, table: &Table, found: &mut dyn FnMut(&str, &Value)) {
             _ => found(&name, value),
         }
     }
-}
-
-/// `sensor = "a.toml"` stands beside `sensor.rows = 16` in no TOML: the file goes by the key that is empty, `sensor."" = "a.toml"`.
-fn with_files_beside_keys(text: &str) -> String {
-    let line = |line: &str| {
-        let indent = line.len() - line.trim_start().len();
-        let (before, rest) = line.split_at(indent);
-        let name = ["sensor", "scene"].into_iter().find(|name| {
-            let value = rest
-                .strip_prefix(name)
-                .and_then(|rest| rest.trim_start().strip_prefix('='));
-            value.is_some_and(|value| value.trim_start().starts_with(['"', '\'', '[']))
-        });
-        match name {
-            Some(name) => format!("{before}{name}.\"\"{}", &rest[name.len()..]),
-            None => line.to_owned(),
-        }
-    };
-    text.split_inclusive('\n').map(line).collect()
-}
-
-/// What `[vary]` says of a key.
-fn varied(kind: Kind, name: &str, value: &Value) -> Result<Varied, String> {
-    let name = name.trim_end_matches('.');
-    let known = names::find(kind, name)?;
-    let values = match value {
-        Value::Array(list) if list.is_empty() => {
-            return Err(format!("{name} has no values; give at least one"));
-        }
-        Value::Array(list) => {
-            let list: Result<_, String> = list
-                .iter()
-                .map(|value| names::checked(&known, value))
-                .collect();
-            Values::List(list?)
-        }
-        Value::Table(range) => Values::Range(span(&known, name, range)?),
-        _ => {
-            return Err(format!(
-                "{name} has one value; give a list or a range, or write it below [fixed]"
-            ));
-        }
-    };
-    let is_list = |value: &Value| value.is_array();
-    let holds = match &values {
-        // A position is no number that one could plot.
-        Values::List(list) if list.iter().any(is_list) => Holds::Word,
-        _ => known.holds,
-    };
-    Ok(Varied {
-        name: name.to_owned(),
-        column: Column::new(name, known.key.unit, holds),
-        values,
-    })
-}
-
-fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
-    let RangeEntry {
-        from,
-        to,
-        steps,
-        scale,
-    } = range.clone().try_into().map_err(|e: toml::de::Error| {
-        let said = e.message().trim();
-        match Misfit::of(said) {
-            Some(misfit) => format!(
-                "{name}: {}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}",
-                misfit.without_cure()
-            ),
-            None => format!("{name}: {}", in_plain_words(said)),
-        }
-    })?;
-    let ends = [from, to].map(|end| -> Result<f64, String> {
-        let end = names::checked(known, &end)?;
-        let number = end.as_integer().map(|n| n as f64).or(end.as_float());
-        number.ok_or_else(|| format!("{name} does not take numbers; give a list of its values"))
-    });
-    let [from, to] = ends;
-    let (from, to) = (from?, to?);
-    if steps == Some(0) || (steps == Some(1) && from != to) {
-        return Err(format!(
-            "{name}: a range needs at least 2 steps, its ends; give steps"
-        ));
-    }
-    if scale == Scale::Log && !(from > 0.0 && to > 0.0) {
-        return Err(format!(
-            "{name}: equal ratios never reach {}; give ends above 0, or scale = \"linear\"",
-            from.min(to)
-        ));
-    }
-    Ok(Span {
-        from,
-        to,
-        steps,
-        is_log: scale == Scale::Log,
-        is_whole: known.holds == Holds::Whole,
-    })
 }
 
 #[cfg(test)]

@@ -25,6 +25,9 @@ pub enum Method {
 /// Laser cycles that are run at gate level at most.
 pub const GATE_CYCLES: u32 = 20;
 
+/// CLK periods of the laser cycles for which [`Method::processor_ns`] was measured.
+pub(super) const MEASURED_PERIODS: f64 = 520.0;
+
 impl Method {
     /// Every method of the comparison: the one that the others are held against, and last the one that takes longest.
     pub const ALL: [Method; 9] = [
@@ -38,6 +41,18 @@ impl Method {
         Method::Cohort,
         Method::Gate,
     ];
+
+    /// Processor time for a macropixel and laser cycle in the dark, ns, and what each klux adds: medians of the walls of
+    /// `gdtof pareto --macropixels 256 --laser-cycles 200 --repeats 1`, other work beside it.
+    pub(super) fn processor_ns(self) -> [f64; 2] {
+        match self {
+            Method::Gate => [24e3, 3.4e3],
+            Method::Cycle | Method::WindowWithoutSkipping => [3.4e3, 75.0],
+            Method::Window | Method::AnotherSeed | Method::FewerCycles(_) | Method::Cohort => {
+                [800.0, 3.0]
+            }
+        }
+    }
 
     /// Engine and knob, as tables name them.
     pub(crate) fn name(self) -> String {

@@ -111,13 +111,10 @@ fn netlists_are_refused_with_file_and_cure() {
             "lfsr.json",
             "--block lfsr.json: is no BLOCK=FILE with a block; give p_counter",
         ),
-        (
-            "p_counter=gone.json",
-            "--block p_counter=gone.json: gone.json: ",
-        ),
+        ("p_counter=gone.json", "gdtof: gone.json: cannot be read"),
         (
             "p_counter=no.json",
-            "--block p_counter=no.json: no.json: is no netlist of Yosys (line 1: it is no JSON); write one with: yosys -p",
+            "gdtof: no.json: is no netlist of Yosys (line 1: it is no JSON); write one with: yosys -p",
         ),
         (
             "p_counter=none.json",

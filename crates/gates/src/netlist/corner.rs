@@ -43,9 +43,7 @@ impl std::str::FromStr for Corner {
             "fast" | "min" => Ok(Corner::Fast),
             "typ" => Ok(Corner::Typ),
             "slow" | "max" => Ok(Corner::Slow),
-            _ => Err(format!(
-                "{text:?} is not a speed of silicon; give slow, typ or fast"
-            )),
+            _ => Err("is not a speed of silicon; give slow, typ or fast".to_owned()),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
 
-use femtogate::InputError;
+use femtogate::{InputError, in_words};
 
 use super::guarded::open_input;
 use super::npy::{Element, NpyHead, Number};
@@ -82,7 +82,7 @@ fn open(
 }
 
 fn broken(path: &Path, error: &std::io::Error) -> InputError {
-    let error = error.to_string().replace('\n', " ");
+    let error = in_words(error);
     let message = format!("is not a NumPy file of such numbers ({error}); give a .npy");
     InputError::new(path.display(), message)
 }

@@ -59,6 +59,9 @@ pub fn said_of_kept_files() -> Vec<String> {
 /// # Errors
 /// A named pipe, a device, a folder, and what cannot be opened.
 pub fn open_file(path: &Path) -> Result<File, InputError> {
+    if path.as_os_str().is_empty() {
+        return Err(InputError::new("\"\"", "is no name of a file; give one"));
+    }
     let unreadable = |e| InputError::unreadable(path, &e);
     let kind = fs::metadata(path).map_err(unreadable)?.file_type();
     let complain = |message: String| Err(InputError::new(path.display(), message));

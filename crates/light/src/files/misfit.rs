@@ -36,12 +36,15 @@ pub fn in_plain_words(said: &str) -> String {
     match Misfit::of(&said) {
         Some(misfit) => misfit.to_string(),
         None if is_no_word(&said) => "a word belongs here; correct this entry".into(),
-        None => wrong_name(&said).unwrap_or_else(|| format!("{said}; correct this entry")),
+        None => match wrong_name(&said) {
+            Some((what, cure)) => format!("{what}; {cure}"),
+            None => format!("{said}; correct this entry"),
+        },
     }
 }
 
-/// What a reader says of a name that is none or is missing, with a cure.
-pub(crate) fn wrong_name(said: &str) -> Option<String> {
+/// What a reader says of a name that is none or is missing, and a cure.
+pub(crate) fn wrong_name(said: &str) -> Option<(String, String)> {
     let after = |beginning: &str| said.strip_prefix(beginning)?.split_once('`');
     // Names that are possible stand between backquotes, too.
     let known = |rest: &str| -> Vec<String> {
@@ -53,13 +56,22 @@ pub(crate) fn wrong_name(said: &str) -> Option<String> {
     };
     let instead = |given: &str, rest: &str| instead_of(given, known(rest).iter().map(|k| &**k));
     if let Some((name, rest)) = after("unknown field `") {
-        return Some(format!("unknown key `{name}`; {}", instead(name, rest)));
+        return Some((format!("unknown key `{name}`"), instead(name, rest)));
     }
     if let Some((name, rest)) = after("unknown variant `") {
-        return Some(format!("`{name}` is impossible; {}", instead(name, rest)));
+        return Some((format!("`{name}` is impossible"), instead(name, rest)));
     }
     let (name, _) = after("missing field `")?;
-    Some(format!("the key `{name}` is missing; add it"))
+    Some((format!("the key `{name}` is missing"), "add it".into()))
+}
+
+/// The word that a reader does not know, if it says so.
+pub(crate) fn unknown_word(said: &str) -> Option<&str> {
+    let (word, _) = said
+        .trim()
+        .strip_prefix("unknown variant `")?
+        .split_once('`')?;
+    Some(word)
 }
 
 /// Whether a reader says that something else stands where one of some words belongs.

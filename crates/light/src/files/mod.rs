@@ -39,7 +39,7 @@ pub use interruption::clean_up_when_interrupted;
 pub use journal::{Journal, JournalReader, is_journal, journal_line};
 pub use misfit::Misfit;
 pub use misfit::in_plain_words;
-pub(crate) use misfit::is_no_word;
+pub(crate) use misfit::{is_no_word, unknown_word};
 pub use npy::{Element, NpyHead, Number, write_npy, write_npy_elements, write_npy_head};
 pub use output::{OutputFile, create_folder};
 pub use raster::Raster;

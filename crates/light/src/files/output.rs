@@ -63,9 +63,21 @@ impl OutputFile {
         path: &Path,
         fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), InputError> {
+        Self::prepared(path, fill)?.commit()
+    }
+
+    /// Writes a whole file through `fill`, for the caller to commit: of several files, all appear or none.
+    ///
+    /// # Errors
+    /// As [`OutputFile::create`], or an I/O error of `fill`.
+    pub fn prepared(
+        path: &Path,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<Self, InputError> {
         let mut file = Self::create(path)?;
-        fill(&mut file.writer).map_err(|e| InputError::unwritable(path, &e))?;
-        file.commit()
+        let filled = fill(&mut file.writer).and_then(|()| file.writer.flush());
+        filled.map_err(|e| InputError::unwritable(path, &e))?;
+        Ok(file)
     }
 }
 
@@ -98,6 +110,10 @@ impl Read for OutputFile {
 /// # Errors
 /// When it cannot be made.
 pub fn create_folder(path: &Path) -> Result<(), InputError> {
+    if path.exists() && !path.is_dir() {
+        let message = "is not a folder; give the name of one, or of one to be made";
+        return Err(InputError::new(path.display(), message));
+    }
     std::fs::create_dir_all(path).map_err(|e| InputError::unwritable(path, &e))
 }
 

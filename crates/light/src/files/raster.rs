@@ -153,17 +153,23 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
 /// Refuses a header that promises more than `length` bytes of a file unpack to.
 fn check_length(what: &str, pixels: u64, pixel_bytes: usize, length: u64) -> Result<(), String> {
     match pixels.saturating_mul(pixel_bytes as u64) > length.saturating_mul(MOST_UNPACKED) {
-        true => Err(broken(what, "it ends early")),
+        true => Err(cut_short(what)),
         false => Ok(()),
     }
 }
 
+/// What readers say of a file that is cut short; of what else is wrong they speak in terms of the format.
+const ENDS_EARLY: [&str; 2] = ["unexpected end of file", "failed to fill whole buffer"];
+
 fn broken(what: &str, error: impl std::fmt::Display) -> String {
-    let error = error.to_string().replace('\n', " ");
-    format!(
-        "is a broken {what} ({}); save it again",
-        error.trim_end_matches('.')
-    )
+    match ENDS_EARLY.contains(&error.to_string().as_str()) {
+        true => cut_short(what),
+        false => format!("is a broken {what}; save it again"),
+    }
+}
+
+fn cut_short(what: &str) -> String {
+    format!("is a broken {what} (it ends early); save it again")
 }
 
 fn read_png(reader: BufReader<File>, length: u64) -> Result<Contents, String> {
@@ -248,7 +254,7 @@ fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
         let mut line = Vec::new();
         let read = (&mut reader).take(200).read_until(b'\n', &mut line);
         if read.map_err(|e| broken("PFM", e))? == 0 {
-            return Err(broken("PFM", "its header ends early"));
+            return Err(cut_short("PFM"));
         }
         let line = String::from_utf8_lossy(&line).into_owned();
         words.extend(line.split_whitespace().map(str::to_owned));
@@ -265,7 +271,7 @@ fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
     let wanted = 4 * width * height;
     let read = reader.take(wanted as u64).read_to_end(&mut bytes);
     if read.map_err(|e| broken("PFM", e))? < wanted {
-        return Err(broken("PFM", "it ends early"));
+        return Err(cut_short("PFM"));
     }
     let from_bytes = if scale < 0.0 {
         f32::from_le_bytes

@@ -34,7 +34,7 @@ pub struct Curve {
 #[non_exhaustive]
 pub enum CurveError {
     /// One point, none, or far too many.
-    #[error("{0} points make no curve; give 2 to {MOST_POINTS} pairs of numbers")]
+    #[error("the number of points is {0}; give 2 to {MOST_POINTS} pairs of numbers")]
     Points(usize),
     /// The first number of a pair is not above that of the pair before.
     #[error(
@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn points_that_are_no_curve_are_refused() {
         let refused = |points: &[[f64; 2]]| Curve::new(points).unwrap_err().to_string();
-        assert!(refused(&[[1.0, 1.0]]).contains("1 points make no curve"));
+        assert!(refused(&[[1.0, 1.0]]).contains("the number of points is 1"));
         assert!(refused(&[[1.0, 1.0], [1.0, 2.0]]).contains("rising order"));
         assert!(refused(&[[1.0, 1.0], [f64::NAN, 2.0]]).contains("rising order"));
         assert!(refused(&[[1.0, 1.0], [2.0, -2.0]]).contains("-2 is impossible"));
@@ -252,7 +252,7 @@ mod tests {
         let refused = |text: &str| read(text).unwrap_err().to_string();
         assert!(refused("0,0\n1,2,3\n").starts_with("a.csv:2: \"1,2,3\" is not a pair"));
         assert!(refused("x,y\nz,w\n").starts_with("a.csv:2: "));
-        assert!(refused("").starts_with("a.csv: 0 points"));
+        assert!(refused("").starts_with("a.csv: the number of points is 0"));
         let long: String = (0..=MOST_POINTS).map(|x| format!("{x},1\n")).collect();
         assert!(refused(&long).starts_with("a.csv:65537: has more than 65536 pairs"));
         assert!(read(&long[..long.len() - 8]).is_ok());

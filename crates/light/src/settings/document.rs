@@ -97,6 +97,11 @@ impl Document {
         }
     }
 
+    /// What complaints call it.
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
     /// Whether there is no value at all.
     pub(crate) fn is_empty(&self) -> bool {
         self.table.is_empty()
@@ -231,7 +236,7 @@ impl Document {
         placed.sort_by(|a, b| a.0.cmp(&b.0));
         InputError::all(placed.into_iter().map(|(origin, message)| match origin {
             Some(Origin::Line(line)) => InputError::at(&self.source, line, message),
-            Some(Origin::Option(option)) => InputError::new(option, message),
+            Some(Origin::Option(option)) => about_option(&option, message),
             None => InputError::new(&self.source, message),
         }))
     }
@@ -265,6 +270,25 @@ impl Document {
             self.origin(section)
         })
     }
+}
+
+/// A complaint about what an option gave; about a file that it names, where the message begins with that.
+fn about_option(option: &str, message: String) -> InputError {
+    let about_file = || {
+        let (_, value) = option.split_once('=')?;
+        let (file, rest) = value.split(',').find_map(|file| {
+            let file = file.trim();
+            let rest = message.strip_prefix(file)?;
+            (!file.is_empty() && rest.starts_with(':')).then_some((file, rest))
+        })?;
+        let numbered = rest[1..].split_once(": ");
+        let line = numbered.and_then(|(line, rest)| Some((line.parse().ok()?, rest)));
+        Some(match line {
+            Some((line, rest)) => InputError::at(file, line, rest),
+            None => InputError::new(file, rest.strip_prefix(": ")?),
+        })
+    };
+    about_file().unwrap_or_else(|| InputError::new(option, message))
 }
 
 fn extend(path: &mut String, name: &str) {

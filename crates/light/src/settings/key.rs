@@ -3,7 +3,7 @@
 use toml::Value;
 
 use super::quantity;
-use crate::files::{Misfit, in_plain_words, is_no_word};
+use crate::files::{Misfit, in_plain_words, is_no_word, nearest, unknown_word};
 
 /// A key: what it is, in which unit, what it may be, and where its default comes from.
 #[derive(Debug, Clone, Copy)]
@@ -147,6 +147,12 @@ impl Key {
                         words.join(", ")
                     )
                 }
+                Range::WordOrCurve(words, _) => match unknown_word(said) {
+                    Some(word) if nearest(word, words.iter().copied()).is_none() => {
+                        format!("{}: `{word}` is impossible; give {range}", self.name)
+                    }
+                    _ => format!("{}: {}", self.name, in_plain_words(said)),
+                },
                 _ => format!("{}: {}", self.name, in_plain_words(said)),
             };
         };

@@ -136,7 +136,9 @@ pub(super) fn read(text: &str) -> Result<Group<'_>, LibertyError> {
         match reader.token()? {
             None => return Ok(library),
             Some(Token::Mark(b';')) => {}
-            Some(_) => return Err(reader.fault("something follows the library's closing brace")),
+            Some(_) => return Err(reader.fault(
+                "something follows the library's closing brace; remove it, or a brace before it",
+            )),
         }
     }
 }
@@ -305,7 +307,7 @@ impl<'t> Reader<'t> {
                 None => {
                     let (kind, name, line) = (group.kind, group.name(), group.line);
                     return Err(self.fault(format!(
-                        "the {kind} {name} of line {line} has no closing brace"
+                        "the {kind} {name} of line {line} has no closing brace; add it"
                     )));
                 }
             };

@@ -106,7 +106,7 @@ impl<'a> Parser<'a, '_> {
             Token::End => "the end of the file".to_owned(),
         };
         self.error(format!(
-            "found {found} where {wanted} belongs; correct it or write the file anew"
+            "found {found} where {wanted} belongs; give an SDF file, or write this one anew"
         ))
     }
 

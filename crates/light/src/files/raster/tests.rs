@@ -177,7 +177,7 @@ fn what_cannot_be_read_is_named_and_nothing_large_is_unpacked() {
             "broken PFM (it ends early)",
         ),
         (b"Pf\n0 2\n-1.0\n1234".to_vec(), "no pixels"),
-        (b"Pf\n3".to_vec(), "header ends"),
+        (b"Pf\n3".to_vec(), "broken PFM (it ends early)"),
         (b"Pf\n99999999 99999999 1\n".to_vec(), "99999999 x 99999999"),
         (huge[..40].to_vec(), "broken NumPy file"),
         (huge, "99999999 x 99999999"),

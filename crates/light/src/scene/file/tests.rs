@@ -71,7 +71,7 @@ fn optics_that_cannot_be_are_refused_with_their_line() {
         ),
         ("beam = [[0, 1.0], [0, 0.5]]", "rising order"),
         ("beam = \"no/such.csv\"", "no/such.csv"),
-        ("pulse = [[0, 1]]", "1 points make no curve"),
+        ("pulse = [[0, 1]]", "the number of points is 1"),
         ("pulse = [[0, 0.0], [1, 0.0]]", "all values are 0"),
         ("hot_spad_share = 1.5", "give 0 to 1"),
     ] {
