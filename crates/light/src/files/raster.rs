@@ -293,12 +293,13 @@ fn read_exr(mut reader: BufReader<File>, length: u64) -> Result<Contents, String
     use exr::error::Error;
     use exr::image::FlatSamples;
     use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
-    let told = |e: Error| match e {
-        Error::NotSupported(what) => format!(
-            "is an EXR of a kind that is not read ({what}); save it as scan lines or tiles of one full channel, packed as ZIP or PIZ"
-        ),
-        Error::Invalid(why) => broken("EXR", why.trim_start_matches("invalid: ")),
+    let told = |e: Error| {
+        match e {
+        Error::NotSupported(_) => {
+            "is an EXR of a kind that is not read; save it in scan lines or tiles, packed as ZIP or PIZ, without deep or subsampled channels".to_owned()
+        }
         other => broken("EXR", other),
+    }
     };
     let about = MetaData::read_from_buffered(&mut reader, false).map_err(told)?;
     if about.headers.is_empty() {
