@@ -18,7 +18,7 @@ use super::result::{Frame, PhaseTimes};
 use super::settings::{EngineKind, FrameSettings, Probe};
 use super::stopwatch::{Stopwatch, timed};
 use super::tolerance::{Kept, Tolerance};
-use crate::chip::{Exposure, Sensor, SensorConfig};
+use crate::chip::{Exposure, SensorConfig};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
     Answer, Cohort, EngineError, Exposed, GateSimulation, LitPixel, Replay, Window, expose,
