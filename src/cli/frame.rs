@@ -1,6 +1,7 @@
 //! `gdtof frame`: the main job.
 
 pub(super) mod pair;
+mod table;
 
 use std::path::PathBuf;
 
@@ -9,20 +10,15 @@ use clap::Args;
 use self::pair::PairReport;
 use super::asked::{ExposureArgs, WaveFormatOption};
 use super::voice::{note, notes, progress, say_json, tell};
-use super::{SceneArgs, asked, quality};
-use crate::analysis::{TimingVerdict, VerdictReport};
-use crate::chip::{Mode, SensorConfig, Silicon};
+use super::{SceneArgs, asked};
+use crate::analysis::TimingVerdict;
+use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
-use crate::files::{InputError, MANIFEST, ResultSet};
+use crate::files::{InputError, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
-use crate::report::Table;
-use crate::request::{
-    FrameReport, FrameRequest, eye_safety_of, frame_s, variance_left_out_of, write_frame,
-};
-use crate::scene::EyeSafety;
-use crate::system::{Frame, FrameSettings, Probe, WindowPolicy, take_frame_by};
-use crate::units::Time;
+use crate::request::{FrameReport, FrameRequest, write_frame};
+use crate::system::{Probe, WindowPolicy, take_frame_by};
 use crate::waves::WaveFormat;
 
 /// Arguments of `gdtof frame`.
@@ -54,6 +50,9 @@ pub(super) struct FrameArgs {
     /// Run every macropixel on the cheapest engine that adds at most M metres of depth error on average.
     #[arg(long, value_name = "M", conflicts_with_all = ["engine", "no_skip"])]
     tolerance: Option<f64>,
+    /// Print all rows: kinds of errors, work, run times.
+    #[arg(long)]
+    verbose: bool,
     /// Draw and run everything, even what the engine could leave out: same histograms, more work.
     #[arg(long)]
     no_skip: bool,
@@ -139,7 +138,11 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
     if args.json {
         say_json(&report)?;
     } else {
-        let mut table = table(args, &settings, &timing, &frame);
+        let mut table = if args.verbose {
+            table::full(args, &settings, &timing, &frame)
+        } else {
+            table::brief(args, &settings, &timing, &frame)
+        };
         if let Some(pair) = pair_report {
             pair.rows(&mut table);
         }
@@ -223,167 +226,6 @@ fn nearest_guided(guide: &GuideMap) -> Option<(usize, usize)> {
             let off = |at: usize, size: u32| (2 * at as i64 + 1 - size as i64).pow(2);
             off(row, guide.rows) + off(col, guide.cols)
         })
-}
-
-fn table(
-    args: &FrameArgs,
-    settings: &FrameSettings,
-    timing: &VerdictReport,
-    frame: &Frame,
-) -> Table {
-    let summary = frame.summary();
-    let of = |part: usize, whole: usize| format!("{part} of {whole}");
-    let mut table = Table::new(format!("Frame of {}", scene_name(args)))
-        .row(
-            "macropixels that see a surface",
-            of(summary.with_target, summary.pixels),
-        )
-        .row(
-            match settings.sensor.mode {
-                Mode::Guided => "guided",
-                Mode::Conventional => "with the one window of the conventional mode",
-            },
-            of(summary.guided, summary.pixels),
-        )
-        .row("surface in window", of(summary.in_window, summary.guided));
-    if !args.exposure.guiding.guides.is_empty() {
-        table.push("guide", settings.guide.name());
-    }
-    quality::rows(&mut table, &settings.depth, &summary);
-    let work = &frame.work;
-    let percent = |part: f64, whole: f64| format!("{:.2} %", 100.0 * part / whole.max(1.0));
-    table.push(
-        "photons on the array",
-        format!("{:.0}", frame.photons_expected),
-    );
-    // More than are expected where several windows look back on the same photons, or by chance where all are drawn.
-    table.push(
-        "simulated: photons, each time they are drawn",
-        percent(work.photons_drawn as f64, frame.photons_expected),
-    );
-    table.push(
-        "simulated: CLK periods",
-        percent(work.clk_periods_visited as f64, work.clk_periods as f64),
-    );
-    let skipped = work.skipped_dark + work.skipped_closed;
-    table.push(
-        "simulated: macropixels",
-        of((work.macropixels - skipped) as usize, summary.pixels),
-    );
-    if let Some(kept) = &frame.kept {
-        table.push(
-            "depth error added, bound",
-            format!("{:.1e} m of {:.1e} m", kept.bound_m, kept.tolerance_m),
-        );
-        table.push(
-            "macropixels on window, cohort",
-            format!("{}, {}", kept.on_window, kept.on_cohort),
-        );
-        for (why, pixels) in kept.refused() {
-            table.push(format!("  refused by cohort: {why}"), pixels);
-        }
-        if kept.refused().next().is_some() {
-            table.push(
-                "  run time of those refused",
-                percent(kept.refused_run_time_share, 1.0),
-            );
-        }
-    }
-    if let Some(share) = variance_left_out_of(settings, frame) {
-        table.push(
-            "variance of counts, left out by cohort",
-            format!(
-                "up to {}: no afterpulse follows its pulse there",
-                percent(share, 1.0)
-            ),
-        );
-    }
-    let lost = work.lost_to_dead_time as f64;
-    table.push(
-        "lost to dead time",
-        percent(lost, work.pulses as f64 + lost),
-    );
-    if work.cancelled > 0 {
-        let share = percent(work.cancelled as f64, work.pulses as f64);
-        table.push(
-            "photons that cancel",
-            format!("{}, {share}", work.cancelled),
-        );
-    }
-    table.push(
-        "serial load",
-        format!("{} bits, {}", frame.load_bits, frame.load_time),
-    );
-    table.push("readout", frame.readout_time);
-    table.push("exposure", frame.exposure_time);
-    let load = match settings.sensor.reset_to_load {
-        true => "windows are loaded between frames, after a reset",
-        false => "the load is hidden behind the frame before",
-    };
-    table.push(
-        "frame after frame",
-        format!(
-            "{}, {load}",
-            settings.sensor.frame_time(frame.exposure_time)
-        ),
-    );
-    table.push(
-        "laser",
-        eye_safety(settings, settings.exposure.laser_cycles, frame),
-    );
-    let left_over = Time::from_s(timing.slack_ps * 1e-12);
-    let met = if timing.met { "met" } else { "FAILS" };
-    table.push("timing, slack", format!("{met}, {left_over}"));
-    table.push("timing, tightest", &timing.check);
-    for ((row, col), cycles) in frame.probes.iter().zip(&frame.probed_cycles) {
-        let engine = args.exposure.engine.of_probes(frame.kept.is_some());
-        let agrees = format!("agrees with {engine:?} in {cycles} laser cycles").to_lowercase();
-        table.push(format!("gate level ({row}, {col})"), agrees);
-    }
-    let times = &frame.times;
-    table.push(
-        "run time: load, gate level",
-        format!("{:.2} s", times.load_s),
-    );
-    table.push(
-        "run time: photons and engine",
-        format!("{:.2} s", times.exposure_s),
-    );
-    table.push(
-        "run time: probes, gate level",
-        format!("{:.2} s", times.probes_s),
-    );
-    table.push("run time: all", format!("{:.2} s", times.total_s()));
-    let names = ["depth.png", "histograms.npy", "frame.json", MANIFEST].map(String::from);
-    let page = args.page.then(|| "page.html".to_owned());
-    let waves = frame.probes.iter().map(|&at| wave_name(args, at));
-    let names: Vec<String> = names.into_iter().chain(page).chain(waves).collect();
-    table.push(format!("in {}", args.out.display()), names.join(" "));
-    table
-}
-
-/// How far the laser is from the limit of class 1, and what limits it.
-fn eye_safety(settings: &FrameSettings, laser_cycles: u32, frame: &Frame) -> String {
-    match eye_safety_of(&settings.sensor, &settings.scene, laser_cycles, frame) {
-        None => "not judged at this wavelength".to_owned(),
-        Some(EyeSafety {
-            times_class_1,
-            rule,
-            within_s,
-            ..
-        }) => {
-            let frames_hz = 1.0 / frame_s(&settings.sensor, &settings.scene, frame);
-            let judged = if times_class_1 > 1.0 {
-                format!("ABOVE class 1, {times_class_1:.2} times its limit")
-            } else {
-                format!("class 1, {times_class_1:.2} of its limit")
-            };
-            format!(
-                "{judged} ({}, within {within_s:.2e} s), at {frames_hz:.1} frames a second",
-                rule.name()
-            )
-        }
-    }
 }
 
 #[cfg(test)]

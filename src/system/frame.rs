@@ -21,8 +21,8 @@ use super::tolerance::{Kept, Tolerance};
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
-    Answer, Cohort, EngineError, Exposed, GateSimulation, LitPixel, Replay, Window, expose,
-    expose_without_skipping, load,
+    Answer, Cohort, EngineError, Exposed, GateSimulation, LitPixel, PulsedPixel, Replay, Window,
+    expose, expose_without_skipping, load,
 };
 use crate::guide::{GuideInput, GuideMap};
 use crate::netlist::Netlist;
@@ -337,7 +337,13 @@ impl Plan<'_> {
                 })
             };
             let by_window = |exposure: &Exposure, events: &[SpadEvent]| {
-                Window::new(&s.sensor, exposure).histogram(probed.start, events)
+                let pixel = PulsedPixel {
+                    number: probed.pixel as u32,
+                    start: probed.start,
+                    pulses: events,
+                };
+                let histograms = Window::new(&s.sensor, exposure).replay(&[pixel])?;
+                Ok::<_, EngineError>(histograms.into_counts())
             };
             let counted = counted.exposed.histograms[probed.pixel].to_vec();
             if engine != EngineKind::Window {

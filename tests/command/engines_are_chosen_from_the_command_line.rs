@@ -66,7 +66,7 @@ fn a_probe_names_the_engine_it_is_compared_with() {
         let small = "frame --rows 4 --cols 4 --laser-cycles 2 --set scene.lidar.pde=0.02";
         let small: Vec<&str> = small.split(' ').collect();
         let table = gdtof(here.path(), &[&small[..], &choice].concat());
-        let said = format!("agrees with {compared_with} in 2 laser cycles");
+        let said = format!("agree with {compared_with} in 2 laser cycles");
         assert!(table.contains(&said), "{choice:?}: {table}");
     }
 }
@@ -183,7 +183,7 @@ fn a_refusal_of_the_cohort_engine_says_what_it_costs() {
     assert_eq!(refused.status.code(), Some(2), "{error}");
     assert!(error.contains("16 of 16 macropixels"), "{error}");
 
-    let done = frame(&["--tolerance", "0.1"]);
+    let done = frame(&["--tolerance", "0.1", "--verbose"]);
     let table = String::from_utf8(done.stdout).unwrap();
     assert!(
         table.contains("refused by cohort: laser cycles may depend"),

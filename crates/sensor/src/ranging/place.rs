@@ -91,7 +91,12 @@ pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit
         variance: fit.bound_bins.powi(2),
         deviance: fit.deviance,
     });
-    let places: Vec<Place> = own.chain(steep).collect();
+    // Of light beyond all measure no chance is known.
+    let known = own.chain(steep).filter(|place| place.deviance.is_finite());
+    let places: Vec<Place> = known.collect();
+    if places.is_empty() {
+        return *chosen;
+    }
     let (position_bins, bound_bins) = mean_place(&places);
     let mut averaged = *chosen;
     averaged.light.position_bins = position_bins;
