@@ -322,6 +322,10 @@ fn a_file_in_the_place_of_a_folder_and_the_like_are_named() {
             "gdtof: --range: range_m = 0 is impossible; give 0.5 to 10000 m",
         ),
         (
+            "timing --rows 1 --cols 1 --mismatch 0.05 --plot p.png",
+            "gdtof: --plot p.png: is written as SVG; give a name that ends in .svg",
+        ),
+        (
             "power --supply-v 10000",
             "gdtof: --supply-v 10000: is impossible; give a number from 0 to 10",
         ),
