@@ -10,7 +10,8 @@ use super::voice::{counted, note, notes, progress, tell};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
-    Drawing, Kind, Outcome, Plot, Results, Shard, Study, SweepError, columns, run as take, study_of,
+    Cell, Drawing, Kind, Outcome, Plot, Results, Shard, Study, SweepError, columns, run as take,
+    study_of,
 };
 
 /// Arguments of `gdtof sweep`.
@@ -99,7 +100,7 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
     let mut table = outcome_table(&study, &outcome, seconds);
     if shard == Shard::WHOLE {
         let folders = std::slice::from_ref(&folder);
-        write(&study, folders, &folder, &plots, Some(outcome), |missing| {
+        let written = write(&study, folders, &folder, &plots, Some(outcome), |missing| {
             anyhow::ensure!(
                 missing == 0,
                 "{missing} of {} rows are no longer in the journal of {}, and no table was written; run the same command once more",
@@ -110,6 +111,7 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
         })?;
         table.push("in", folder.display());
         tell(table)?;
+        written.complain(&study)?;
     } else {
         tell(table)?;
         tell(format_args!(
@@ -134,7 +136,7 @@ fn run_merge(args: &MergeArgs) -> anyhow::Result<()> {
     }
     let plots = plots(&args.results, &study)?;
     let out = args.results.out.as_ref().unwrap_or(&args.folders[0]);
-    let missing = write(&study, &args.folders, out, &plots, None, |missing| {
+    let written = write(&study, &args.folders, out, &plots, None, |missing| {
         if missing == 0 || args.partial {
             return Ok(());
         }
@@ -145,13 +147,34 @@ fn run_merge(args: &MergeArgs) -> anyhow::Result<()> {
         Err(InputError::new("gdtof sweep merge", message).into())
     })?;
     let mut table =
-        Table::new(format!("Sweep {}", study.name)).row("points", study.len() - missing);
-    if missing > 0 {
-        table.push("points that are missing", missing);
+        Table::new(format!("Sweep {}", study.name)).row("points", study.len() - written.missing);
+    if written.missing > 0 {
+        table.push("points that are missing", written.missing);
     }
     table.push("in", out.display());
     tell(table)?;
-    Ok(())
+    Ok(written.complain(&study)?)
+}
+
+/// What stands in a table.
+struct Written {
+    /// Points that do not.
+    missing: u64,
+    /// Why the first point has no result, if no point has one.
+    fault: Option<String>,
+}
+
+impl Written {
+    /// Complains of a study whose settings are wrong at every point.
+    fn complain(self, study: &Study) -> Result<(), InputError> {
+        match self.fault {
+            Some(why) => {
+                let message = format!("no point has a result: {why}");
+                Err(InputError::new(&study.name, message))
+            }
+            None => Ok(()),
+        }
+    }
 }
 
 /// What is drawn, by columns that there are.
@@ -170,7 +193,7 @@ fn plots(args: &ResultArgs, study: &Study) -> Result<Vec<Plot>, InputError> {
     args.plots.iter().map(parse).collect()
 }
 
-/// Writes table and charts, if `check` allows as many points to be missing in them; returns how many are.
+/// Writes table and charts, if `check` allows as many points to be missing in them.
 fn write(
     study: &Study,
     folders: &[PathBuf],
@@ -178,7 +201,7 @@ fn write(
     plots: &[Plot],
     outcome: Option<Outcome>,
     check: impl FnOnce(u64) -> anyhow::Result<()>,
-) -> anyhow::Result<u64> {
+) -> anyhow::Result<Written> {
     let columns = columns(study);
     let set = ResultSet::begin(out, "sweep")?;
     let drawings = plots
@@ -186,7 +209,13 @@ fn write(
         .map(|plot| Drawing::new(plot, study, &columns, "--plot"));
     let mut drawings: Vec<Drawing<'_>> = drawings.collect::<Result<_, _>>()?;
     let results = Results::of(study, folders)?;
+    let (mut fault, mut has_result) = (None, false);
     let missing = results.write(set.staging(), |cells| {
+        match cells.last() {
+            // The last column says why there is no result.
+            Some(Cell::Word(why)) => drop(fault.get_or_insert_with(|| why.clone())),
+            _ => has_result = true,
+        }
         drawings.iter_mut().for_each(|drawing| drawing.see(cells));
     });
     let missing = missing.map_err(plain)?;
@@ -201,7 +230,8 @@ fn write(
         outcome,
     };
     notes(set.commit(configuration)?);
-    Ok(missing)
+    let fault = fault.filter(|_| !has_result);
+    Ok(Written { missing, fault })
 }
 
 /// As what it is, for the exit status.

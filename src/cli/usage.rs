@@ -93,9 +93,10 @@ fn complaint(error: &clap::Error) -> Option<InputError> {
     })
 }
 
-/// `--rows <R>` without what it takes.
+/// `--rows <R>` without what it takes, `<DEMO>` and `[NAME]...` without brackets.
 fn bare(argument: &str) -> &str {
-    argument.split(' ').next().unwrap_or(argument)
+    let name = argument.split(' ').next().unwrap_or(argument);
+    name.trim_matches(['<', '>', '[', ']', '.'])
 }
 
 /// What to say of a value that is not what an option takes.

@@ -71,17 +71,22 @@ pub(super) fn tell(text: impl Display) -> std::io::Result<()> {
     say(text)
 }
 
+/// Writes to standard error, whose reader may have gone away as well; then nobody is told.
+fn to_standard_error(text: impl Display) {
+    let _ = write!(std::io::stderr().lock(), "{text}");
+}
+
 /// What is wrong, a line each.
 pub(super) fn complain(text: impl Display) {
     for line in text.to_string().lines() {
-        eprintln!("gdtof: {line}");
+        to_standard_error(format_args!("gdtof: {line}\n"));
     }
 }
 
 /// A note on standard error.
 pub(super) fn note(text: impl Display) {
     if !is_quiet() {
-        eprintln!("gdtof: {text}");
+        to_standard_error(format_args!("gdtof: {text}\n"));
     }
 }
 
@@ -108,7 +113,7 @@ pub(super) fn notes(sentences: Vec<String>) {
 /// A table on standard error, where standard output has data.
 pub(super) fn aside(text: impl Display) {
     if !is_quiet() {
-        eprint!("{text}");
+        to_standard_error(text);
     }
 }
 

@@ -91,7 +91,10 @@ fn a_folder_without_a_frame_is_refused() {
         assert_eq!(output.status.code(), Some(2), "{sentence}");
         assert!(sentence.contains(says), "{sentence}");
     };
-    refused(&["export", "frame", "."], "frame.json: cannot be read");
+    refused(
+        &["export", "frame", "."],
+        ".: has no frame.json; give a folder",
+    );
     done(here, &FRAME);
     refused(
         &["export", "frame", "out", "--out", "out"],

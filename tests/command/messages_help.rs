@@ -322,6 +322,10 @@ fn a_file_in_the_place_of_a_folder_and_the_like_are_named() {
             "gdtof: --range: range_m = 0 is impossible; give 0.5 to 10000 m",
         ),
         (
+            "timing --rows 1 --cols 1 --mismatch 0.05 --plot p.png",
+            "gdtof: --plot p.png: is written as SVG; give a name that ends in .svg",
+        ),
+        (
             "power --supply-v 10000",
             "gdtof: --supply-v 10000: is impossible; give a number from 0 to 10",
         ),
@@ -351,5 +355,63 @@ fn a_file_in_the_place_of_a_folder_and_the_like_are_named() {
         assert_eq!(status, Some(2), "{words:?}: {error}");
         let says = "gdtof: nothing.toml: has no settings; give ";
         assert!(error.starts_with(says), "{words:?}: {error}");
+    }
+}
+
+/// A table of nothing but refusals is a fault of the study.
+#[test]
+fn a_study_without_any_result_fails_and_says_why() {
+    let dir = folder();
+    let here = dir.path();
+    let study = |fixed: &str| {
+        let text =
+            format!("[fixed]\n{fixed}\nsensor.cols = 2\n[vary]\nframe.laser_cycles = [1, 2]\n");
+        std::fs::write(here.join("refused.toml"), text).unwrap();
+    };
+    for (fixed, says) in [
+        (
+            "guide = \"radr\"",
+            "gdtof: refused: no point has a result: guide: \"radr\" is not a guide; did you mean `radar`?",
+        ),
+        (
+            "sensor = \"gone.toml\"",
+            "gdtof: refused: no point has a result: gone.toml: cannot be read",
+        ),
+    ] {
+        study(fixed);
+        // Again, with what is in the journal.
+        for _ in 0..2 {
+            let (status, error) = said(here, &["sweep", "refused.toml", "--out", fixed]);
+            assert_eq!(status, Some(2), "{error}");
+            assert!(error.starts_with(says), "{error}");
+            let (status, error) = said(here, &["sweep", "merge", fixed]);
+            assert_eq!(status, Some(2), "{error}");
+        }
+    }
+    study("sensor.rows = 2");
+    let (status, error) = said(here, &["sweep", "refused.toml", "--out", "whole"]);
+    assert_eq!(status, Some(0), "{error}");
+}
+
+/// As of `gdtof … 2>&1 | head -1`.
+#[cfg(unix)]
+#[test]
+fn a_reader_of_messages_that_has_gone_stops_nothing() {
+    use std::process::{Command, Stdio};
+    let dir = folder();
+    for (words, status) in [
+        ("sensor --set sensor.clkhz=3e8", 2),
+        ("sensor --liberty example.lib", 0),
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let run = Command::new(env!("CARGO_BIN_EXE_gdtof"))
+            .args(words.split(' '))
+            .current_dir(dir.path())
+            .stdout(Stdio::null())
+            .stderr(writer)
+            .status()
+            .unwrap();
+        assert_eq!(run.code(), Some(status), "{words}");
     }
 }

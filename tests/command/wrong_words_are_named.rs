@@ -185,6 +185,11 @@ fn what_is_no_command_and_no_option_is_named() {
             &["wave"],
             "--pixel, --cycle: are needed; give them, as `--help` says",
         ),
+        (&["demo"], "gdtof: DEMO: is needed; give it"),
+        (
+            &["schema", "sensors"],
+            "gdtof: FILE sensors: is unknown; did you mean `sensor`?",
+        ),
         (&["frame", "street", "van"], "van: is unknown here; "),
         (
             &["frame", "--wave-cycles", "many"],

@@ -61,6 +61,17 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
         let message = format!("the tables are those of a shift register, and this sensor {what}");
         return Err(InputError::new("--sensor", message).into());
     }
+    let is_other = |extension| {
+        ["png", "jpg", "pdf", "eps"]
+            .iter()
+            .any(|other| extension == *other)
+    };
+    if let Some(plot) = &args.plot
+        && plot.extension().is_some_and(is_other)
+    {
+        let message = "is written as SVG; give a name that ends in .svg";
+        return Err(InputError::new(format!("--plot {}", plot.display()), message).into());
+    }
     if let (Some(plot), None) = (&args.plot, silicon.mismatch) {
         let message =
             "without mismatch all macropixels are equal; add --mismatch 0.05, for example";

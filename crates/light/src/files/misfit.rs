@@ -36,6 +36,9 @@ pub fn in_plain_words(said: &str) -> String {
     match Misfit::of(&said) {
         Some(misfit) => misfit.to_string(),
         None if is_no_word(&said) => "a word belongs here; correct this entry".into(),
+        None if said.ends_with(" number overflowed") => {
+            "this number is too large; give a smaller one".into()
+        }
         None => match wrong_name(&said) {
             Some((what, cure)) => format!("{what}; {cure}"),
             None => format!("{said}; correct this entry"),

@@ -6,6 +6,7 @@
 //! | `arrays.rs` | NumPy files of known shape: results that are read again, users' counts |
 //! | `npy.rs` | NumPy files: head and elements |
 //! | `misfit.rs` | values of the wrong type, without the names of types |
+//! | `no_toml.rs` | settings that are no TOML, and files of other kinds in their place |
 //! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM, EXR |
 //! | `output.rs` | output files: beside the target first, then renamed over it |
 //! | `guarded.rs` | inputs of a run, which it does not replace, and files in its way that are not its own |
@@ -20,6 +21,7 @@ mod input;
 mod interruption;
 mod journal;
 mod misfit;
+mod no_toml;
 mod npy;
 mod output;
 mod raster;

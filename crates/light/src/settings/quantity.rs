@@ -100,6 +100,9 @@ pub(super) fn in_unit(text: &str, wanted: &str) -> Result<f64, String> {
         _ => format!("give {dimension} such as \"1 {wanted}\", or a plain number of {wanted}"),
     };
     let (number, symbol) = split(text);
+    if number.is_empty() {
+        return Err(format!("is not a number; {cure}"));
+    }
     let power = match symbol {
         "" => wanted_power,
         _ => match unit(symbol) {
