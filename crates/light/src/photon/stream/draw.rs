@@ -30,7 +30,7 @@ impl Run {
 
     /// Blocks whose first, second, third and fourth words make photons.
     #[inline]
-    pub(crate) fn blocks(&self) -> [Range<usize>; PER_BLOCK] {
+    pub fn blocks(&self) -> [Range<usize>; PER_BLOCK] {
         let first = self.first_block as usize;
         let photons = self.photons as usize;
         std::array::from_fn(|row| first..first + (photons + PER_BLOCK - 1 - row) / PER_BLOCK)

@@ -52,6 +52,11 @@ impl Numbers {
         }
     }
 
+    /// The mean in one laser cycle.
+    pub(super) fn mean(&self) -> f64 {
+        self.per_cycle
+    }
+
     /// In one laser cycle.
     pub(super) fn per_cycle(&self) -> &Poisson {
         self.one.get_or_init(|| poisson(self.per_cycle))

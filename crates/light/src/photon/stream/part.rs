@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-use super::exposure::{FAR_FS, PhotonStream, sampler};
+use super::exposure::{FAR_FS, PhotonStream, Span, sampler};
 use super::foreign::Foreign;
 use super::group::{FIRST, Group, PLACE_BITS};
 use super::limits::Limits;
@@ -193,6 +193,13 @@ impl PixelStream<'_> {
             true => Group::long(cycle, grid),
             false => Group::of_cycle(cycle, grid),
         }
+    }
+
+    /// Photons that are drawn of a span of a laser cycle on average, those of an echo whole.
+    pub fn expected(&self, span: &Span) -> f64 {
+        let sees_echo = !span.within_fs.is_empty();
+        let echo = if sees_echo { self.signal.mean() } else { 0.0 };
+        echo + self.background.mean() * span.slots.len() as f64
     }
 
     /// Whether these are the photons whose avalanches trigger others.

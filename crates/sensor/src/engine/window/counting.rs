@@ -10,9 +10,9 @@
 //! too close to an edge, photons are taken out again, and what the dead time leaves of them is counted bin by bin. The
 //! times of photons are worked out only there.
 //!
-//! Cycles with photons that breed are settled as a whole; so are all cycles of a group where photons are many, or where
-//! echoes of other cycles are seen ([`whole`]). Light with several layers, and bins that are not CLK periods, are sorted
-//! ([`sorted`]).
+//! That is for little light of one layer. Other dim light goes into a table of bits, where dead time is decided for many laser
+//! cycles at once ([`tabled`]). Bins of a delay line are sorted ([`sorted`]), or settled cycle by cycle ([`whole`]); bright light is
+//! counted many laser cycles side by side ([`side_by_side`]), or one after the other ([`bright`]).
 
 use smallvec::SmallVec;
 
@@ -37,6 +37,7 @@ mod settling;
 mod side_by_side;
 mod sorted;
 mod spacing;
+mod tabled;
 mod tile;
 mod whole;
 
@@ -46,11 +47,11 @@ pub(super) struct Counting<'a> {
     stream: &'a PhotonStream,
     binning: Binning,
     /// What a CLK period adds to its bin, by the number of SPADs that fired.
-    adds: [i64; SPADS + 1],
+    adds: Vec<i64>,
     spacing: Spacing,
     plain: Drawn,
     breeding: ByWindow,
-    /// Photons of light with several layers, one for each part.
+    /// Photons of parts of the light that are kept by window.
     layers: Vec<ByWindow>,
     past: PastDraws,
     /// Codes of all photons drawn for the group that do not breed. Photons are known by their index here.
@@ -147,6 +148,14 @@ impl Drawn {
     }
 }
 
+/// Photons of a laser cycle, on average, up to which each is counted on its own. In ns for a laser cycle, so and in a table of bits:
+/// 8 Mcounts/s and 0.1 signal photons 4.4 and 11, 26 and 0.1 15 and 20, 26 and 1 39 and 33, 26 and 7.9 464 and 92 (0.5, 1.5, 2.4
+/// and 9.3 photons).
+const LITTLE: f64 = 2.0;
+
+/// The same where some photons breed: 26 Mcounts/s and 1 signal photon 83 and 91, 26 and 3 218 and 159 (2.7 and 4.7 photons).
+const LITTLE_WITH_BREEDING: f64 = 3.0;
+
 /// Which part of a light of one layer breeds, if one does.
 const BREEDING: usize = 1;
 
@@ -176,6 +185,7 @@ impl<'a> Counting<'a> {
         let bins = engine.sensor.bins;
         let dead_s = stream.config().spads.dead_time.as_s();
         let dead_rows = (dead_s * engine.exposure.clock.as_hz()) as usize;
+        let adds = |spads: usize| engine.adds(((1u128 << spads) - 1) as u64);
         Counting {
             engine,
             stream,
@@ -185,7 +195,7 @@ impl<'a> Counting<'a> {
                 far: dead_rows + 2,
                 blind: dead_rows,
             },
-            adds: std::array::from_fn(|spads| engine.adds((1 << spads) - 1)),
+            adds: (0..=stream.spads()).map(adds).collect(),
             plain: Drawn::default(),
             breeding: ByWindow::default(),
             layers: Vec::new(),
@@ -249,15 +259,24 @@ impl<'a> Counting<'a> {
             self.count_bright(&mut pixel);
             return (pixel.hits, pixel.work);
         }
-        if !light.is_alone || !has_clk_bins {
+        if !has_clk_bins {
             match self.can_sort(&pixel) {
                 true => self.count_sorted(&mut pixel),
                 false => self.count_layers(&mut pixel),
             }
             return (pixel.hits, pixel.work);
         }
+        let expected = light.expected(&sight.plain.own) + light.expected(&sight.plain.previous);
+        let little = match breeding {
+            Some(_) => LITTLE_WITH_BREEDING,
+            None => LITTLE,
+        };
+        let is_little = light.is_alone && expected <= little;
+        if !(is_little && has_marks && has_slots_for_bins && pixel.sees_own_echo_only()) {
+            self.count_tabled(&mut pixel);
+            return (pixel.hits, pixel.work);
+        }
         self.tables.clear_counts();
-        let sees_own_echo_only = pixel.sees_own_echo_only();
         let before_exposure_fs = sight
             .breeding
             .own
@@ -274,8 +293,7 @@ impl<'a> Counting<'a> {
             }
             // Photons that come before the exposure are left out there.
             let is_first = group.first_cycle() == 0 && sees_before;
-            let is_simple = has_marks && has_slots_for_bins && !is_first && sees_own_echo_only;
-            if is_simple && self.encode(&mut pixel, cycles) <= MOST_PHOTONS {
+            if !is_first && self.encode(&mut pixel, cycles) <= MOST_PHOTONS {
                 self.count_cells(&mut pixel, group);
             } else {
                 self.count_whole(&mut pixel, group, cycles);
@@ -391,6 +409,11 @@ impl Pixel<'_> {
             true => &self.sight.breeding,
             false => &self.sight.plain,
         }
+    }
+
+    /// Whether any of the photons breed.
+    fn has_breeding(&self) -> bool {
+        self.parts.iter().any(PixelStream::breeds)
     }
 
     /// Whether windows see no echo of another cycle than their own.

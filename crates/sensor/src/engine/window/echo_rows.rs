@@ -42,9 +42,34 @@ const TOGETHER: usize = 2 * LANES;
 pub(super) struct Passed {
     ranks: Vec<i16>,
     /// How many edges they have passed for certain.
-    rows: Vec<i16>,
+    pub rows: Vec<i16>,
     /// How many they may have passed.
-    possible: Vec<i16>,
+    pub possible: Vec<i16>,
+}
+
+impl Passed {
+    /// Finds out about photons with these random words, low and high, a multiple of [`LANES`], that have passed `first_row` edges
+    /// before these.
+    pub(super) fn compare(&mut self, first_row: i16, edges: &[[i16; 2]], words: [&[u32]; 2]) {
+        let filled_up = words[0].len().next_multiple_of(TOGETHER);
+        self.ranks.resize(filled_up, 0);
+        for passed in [&mut self.rows, &mut self.possible] {
+            passed.clear();
+            passed.resize(filled_up, first_row);
+        }
+        compare(self, edges, words);
+    }
+}
+
+/// Leaves out edges that no photon is on either side of for certain; returns how many came before those that are left. The echo is
+/// shorter than most windows. Of the edges in either tail, the nearest one puts in doubt whatever may be on the wrong side of the
+/// others.
+pub(super) fn shorten(edges: &mut Vec<[i16; 2]>) -> i16 {
+    let before = edges.partition_point(|edge| edge[0] < 0).saturating_sub(1);
+    let after = edges.partition_point(|edge| edge[1] < RANKS);
+    edges.truncate(after + 1);
+    edges.drain(..before);
+    before as i16
 }
 
 impl EchoRows {
@@ -62,12 +87,7 @@ impl EchoRows {
             light.signal_ranks_at(time_fs, (ROUNDING_FS + 1) as f64)
         };
         let mut edges: Vec<[i16; 2]> = (0..=bins).map(edge).collect::<Option<_>>()?;
-        // The echo is shorter than most windows. Of the edges in either tail, the nearest one puts in doubt whatever
-        // may be on the wrong side of the others.
-        let before = edges.partition_point(|edge| edge[0] < 0).saturating_sub(1);
-        let after = edges.partition_point(|edge| edge[1] < RANKS);
-        edges.truncate(after + 1);
-        edges.drain(..before);
+        let first_row = shorten(&mut edges);
         Some(EchoRows {
             bins: bins as u32,
             ends: [
@@ -75,7 +95,7 @@ impl EchoRows {
                 light.signal_ranks_at(within_fs.end as f64, 0.0)?,
             ],
             edges,
-            first_row: before as i16,
+            first_row,
         })
     }
 
@@ -88,13 +108,7 @@ impl EchoRows {
         passed: &mut Passed,
         (codes, marks): (&mut [Code], &mut [u32]),
     ) {
-        let filled_up = low.len().next_multiple_of(TOGETHER);
-        passed.ranks.resize(filled_up, 0);
-        passed.rows.clear();
-        passed.rows.resize(filled_up, self.first_row);
-        passed.possible.clear();
-        passed.possible.resize(filled_up, self.first_row);
-        compare(passed, &self.edges, [low, high]);
+        passed.compare(self.first_row, &self.edges, [low, high]);
         encode(self, wanted, place_shift, high, passed, codes, marks);
     }
 }

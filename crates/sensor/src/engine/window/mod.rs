@@ -15,7 +15,9 @@ mod counting;
 mod echo_rows;
 mod past;
 mod pulses;
+mod row_ranks;
 mod sight;
+mod table;
 mod tables;
 
 use std::borrow::Cow;

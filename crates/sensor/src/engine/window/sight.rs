@@ -104,6 +104,11 @@ impl Rows {
         }
     }
 
+    /// Edges of the bins after the start of the window's cycle, fs.
+    pub(super) fn edges_fs(&self) -> &[i64] {
+        &self.edges_fs
+    }
+
     /// Whether a time is in any bin; `None` where it may be on either side of the first or the last edge.
     #[inline]
     pub(super) fn are_around(&self, time_fs: i64) -> Option<bool> {

@@ -1,4 +1,4 @@
-//! Light of any number of layers, and bins of any lengths: the photons of a group as words that sort by laser cycle and time.
+//! Bins of a delay line: the photons of a group as words that sort by laser cycle and time.
 //!
 //! ```text
 //!   word    63          50                            6      0
@@ -15,7 +15,6 @@
 use std::cell::Cell;
 
 use super::{Counting, Pixel};
-use crate::chip::Tdc;
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::photon::{DeadTimeLaw, Draw, Group, Photon};
 use crate::units::Time;
@@ -175,9 +174,8 @@ impl Counting<'_> {
             && let Some(row) = pixel.sight.rows.row_of(words_of(pixel).time_fs(word))
         {
             if row > 0 {
-                pixel.hits[row - 1] += self.adds[1];
+                pixel.hits[row - 1] += 1;
                 pixel.work.pulses += 1;
-                pixel.work.clk_periods_visited += u64::from(self.engine.sensor.tdc.has_clk_bins());
             }
             return;
         }
@@ -241,18 +239,15 @@ impl Counting<'_> {
                 fate,
             };
         }
-        let is_line = self.engine.sensor.tdc == Tdc::DelayLine;
-        if is_line {
-            let stage_fs = self.engine.law.timing().photon_line_stage.as_fs();
-            let mut pulses = seen.iter().filter(|photon| photon.fate != Fate::Lost);
-            let mut last_fs = pulses.next().map_or(0, |photon| photon.time_fs);
-            for pulse in pulses {
-                // One of them may take the other's edge back.
-                if pulse.time_fs - last_fs < stage_fs && pulse.time_fs >= wanted_from_fs {
-                    return None;
-                }
-                last_fs = pulse.time_fs;
+        let stage_fs = self.engine.law.timing().photon_line_stage.as_fs();
+        let mut pulses = seen.iter().filter(|photon| photon.fate != Fate::Lost);
+        let mut last_fs = pulses.next().map_or(0, |photon| photon.time_fs);
+        for pulse in pulses {
+            // One of them may take the other's edge back.
+            if pulse.time_fs - last_fs < stage_fs && pulse.time_fs >= wanted_from_fs {
+                return None;
             }
+            last_fs = pulse.time_fs;
         }
         let in_window = |photon: &&Seen| photon.row > 0;
         let all = seen.iter().filter(in_window).count() as u64;
@@ -263,22 +258,13 @@ impl Counting<'_> {
             .peekable();
         let (mut fired, mut counted) = (0, 0);
         while let Some(first) = pulses.next() {
-            let mut spads = 1u64 << first.spad;
             let mut edges = 1;
-            while let Some(other) = pulses.next_if(|other| other.row == first.row) {
-                spads ^= 1 << other.spad;
+            while pulses.next_if(|other| other.row == first.row).is_some() {
                 edges += 1;
             }
             fired += edges;
-            let hits = &mut pixel.hits[first.row - 1];
-            if is_line {
-                *hits += (edges % 2) as i64;
-                counted += edges % 2;
-            } else {
-                *hits += self.engine.adds(spads);
-                counted += u64::from(spads.count_ones());
-                pixel.work.clk_periods_visited += 1;
-            }
+            counted += edges % 2;
+            pixel.hits[first.row - 1] += (edges % 2) as i64;
         }
         pixel.work.pulses += fired;
         pixel.work.cancelled += fired - counted;

@@ -212,10 +212,10 @@ impl Tile {
 
 /// Adds what each row's SPADs add to its hits; returns how many rows have a SPAD.
 #[multiversion(targets("x86_64+avx2+popcnt"))]
-pub(super) fn count_rows(fired: &[u16], adds: &[i64; SPADS + 1], hits: &mut [i64]) -> u64 {
+pub(super) fn count_rows(fired: &[u16], adds: &[i64], hits: &mut [i64]) -> u64 {
     let mut visited = 0;
     for (hits, spads) in hits.iter_mut().zip(fired) {
-        *hits += adds[spads.count_ones() as usize % (SPADS + 1)];
+        *hits += adds[spads.count_ones() as usize];
         visited += u64::from(*spads != 0);
     }
     visited

@@ -65,7 +65,7 @@ impl Counting<'_> {
     }
 
     /// Appends photons of other cycles' echoes that the windows of a group may see.
-    fn other_echoes(
+    pub(super) fn other_echoes(
         &self,
         pixel: &Pixel<'_>,
         light: &PixelStream<'_>,
