@@ -60,9 +60,12 @@ impl WalkCorrection {
                 // The light until the end of the edge's bin says how much of the pulse has come.
                 Some((bin, photons)) if edge_is_seen(bin) => {
                     let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
-                    [-0.3, -sigma_bins.min(0.2), 0.0, sigma_bins.min(0.2), 0.3]
-                        .map(|off| end + off)
-                        .to_vec()
+                    let beside: &[f64] = if is_short {
+                        &[-0.3, -sigma_bins, 0.0, sigma_bins, 0.3]
+                    } else {
+                        &[-0.3, 0.0, 0.3]
+                    };
+                    beside.iter().map(|off| end + off).collect()
                 }
                 Some(_) => (-12..=12)
                     .map(|n| 0.3 * f64::from(n))
