@@ -13,6 +13,9 @@ use smallvec::SmallVec;
 /// Part of a face's area by which its triangles may differ from it. Files round corners, often to single precision.
 const ROUNDED: f64 = 1e-5;
 
+/// Volume that three sides from a corner span, over that of sides of their lengths at right angles, from which on they are in no plane: chosen.
+const FOLDED: f64 = 1e-3;
+
 /// Triangles with their corners.
 #[derive(Default)]
 pub(super) struct Listed {
@@ -76,8 +79,9 @@ impl Listed {
 
 /// Triangles that cover a face, by the places of their corners in its outline; `None` where its sides cross.
 fn cut_face(outline: &[[f64; 3]]) -> Option<SmallVec<[[usize; 3]; 2]>> {
+    let from_first = || (2..outline.len()).map(|n| [0, n - 1, n]).collect();
     if !is_concave(outline) {
-        return Some((2..outline.len()).map(|n| [0, n - 1, n]).collect());
+        return Some(from_first());
     }
     let mut flat = Vec::new();
     if !project3d_to_2d(outline, outline.len(), &mut flat) {
@@ -85,8 +89,22 @@ fn cut_face(outline: &[[f64; 3]]) -> Option<SmallVec<[[usize; 3]; 2]>> {
     }
     let mut cut: Vec<usize> = Vec::new();
     Earcut::new().earcut_slice(&flat, &[], &mut cut);
-    let is_covered = earcut::deviation(flat, &[], &cut) < ROUNDED;
-    is_covered.then(|| cut.as_chunks::<3>().0.into())
+    if earcut::deviation(flat, &[], &cut) < ROUNDED {
+        return Some(cut.as_chunks::<3>().0.into());
+    }
+    // Sides of a folded quadrangle cross only as they are seen from somewhere.
+    is_folded(outline).then(from_first)
+}
+
+/// Whether four corners are plainly not in one plane.
+fn is_folded(outline: &[[f64; 3]]) -> bool {
+    let [first, others @ ..] = outline else {
+        return false;
+    };
+    let [a, b, c] = others else { return false };
+    let [a, b, c] = [a, b, c].map(|corner| DVec3::from_array(*corner) - DVec3::from_array(*first));
+    let lengths = a.length() * b.length() * c.length();
+    a.cross(b).dot(c).abs() > FOLDED * lengths
 }
 
 /// Whether a triangle is more than a line.

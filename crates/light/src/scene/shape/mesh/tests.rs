@@ -82,6 +82,19 @@ fn convex_faces_are_cut_from_their_first_corner() {
 }
 
 #[test]
+fn a_folded_quadrangle_is_two_triangles() {
+    // Seen along its normal its sides cross.
+    let corners = [
+        [12.880, 236.295, 43.735],
+        [12.819, 236.279, 43.792],
+        [12.945, 236.357, 42.973],
+        [12.884, 236.198, 42.910],
+    ];
+    let mesh = read(&obj_of(&corners, [vec![0, 1, 2, 3]])).unwrap();
+    assert_eq!(mesh.triangles(), 2);
+}
+
+#[test]
 fn a_face_that_crosses_itself_is_refused() {
     let bow = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]];
     let error = read(&one_face(&bow)).unwrap_err().to_string();
