@@ -150,7 +150,7 @@ def test_copies_travel() -> None:
         (lambda: gdtof.Sensor(rows=0), "rows = 0 is impossible; give 1 to 256"),
         (lambda: gdtof.Sensor(row=1), "unknown key `row`"),
         (lambda: gdtof.Sensor(clk_hz="8 ns"), "is a time; give a frequency"),
-        (lambda: gdtof.Sensor().with_(rows="many"), "has an unknown unit; give a plain number"),
+        (lambda: gdtof.Sensor().with_(rows="many"), "is not a number; give a plain number"),
         (lambda: gdtof.Sensor.from_toml("rows = 0"), "sensor:1: rows = 0 is impossible"),
         (lambda: gdtof.Scene.from_toml("[lidar]\npde = 2", "mine"), "mine:2: in [lidar], pde = 2 is impossible; give 0 to 1"),
         (lambda: gdtof.Scene().with_({"object.cat.reflectivity": 1}), "there is no object \"cat\""),
