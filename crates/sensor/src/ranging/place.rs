@@ -31,6 +31,9 @@ const DEPTHS: [f64; 3] = [0.1, 0.2, 0.4];
 /// Deviance by which a place may be less likely and still is within five bounds: of 2000 echoes one is beyond.
 pub(super) const UNLIKELY: f64 = 12.0;
 
+/// Deviance by which a place may be less likely and still have others behind it that count: chosen, e⁻³⁰ of the fit's likelihood.
+const FAR: f64 = 60.0;
+
 /// Bounds within which such places are.
 const REACH: f64 = 4.0;
 
@@ -91,7 +94,7 @@ pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit
         variance: fit.bound_bins.powi(2),
         deviance: fit.deviance,
     });
-    // Of light beyond all measure no chance is known.
+    // Those behind unlikely ones are left out. Of light beyond all measure no chance is known.
     let known = own.chain(steep).filter(|place| place.deviance.is_finite());
     let places: Vec<Place> = known.collect();
     if places.is_empty() {
@@ -117,7 +120,7 @@ fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
     offsets.sort_by(f64::total_cmp);
     offsets.dedup_by(|a, b| *a - *b < 1e-9);
     let middle = offsets.partition_point(|off| *off < 0.0);
-    let mut deviances = vec![0.0; offsets.len()];
+    let mut deviances = vec![f64::INFINITY; offsets.len()];
     let mut follow = |order: &mut dyn Iterator<Item = usize>| {
         let mut light = fit.light;
         for at in order {
@@ -125,6 +128,9 @@ fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
             let near = held.near(&light);
             light.signal = near.light.signal;
             deviances[at] = near.deviance;
+            if near.deviance > fit.deviance + FAR {
+                break;
+            }
         }
     };
     follow(&mut (middle..offsets.len()));
