@@ -13,11 +13,11 @@ const PIXELS: u16 = 6;
 struct Case {
     name: &'static str,
     background_hz: f64,
-    /// Photons of a laser cycle, in so many echoes.
+    /// Photons of a laser cycle, and in how many echoes.
     signal: f64,
     echoes: i32,
     /// Probability of an afterpulse, and of crosstalk.
-    breeds: f64,
+    secondaries: f64,
     /// SPADs along a side of a macropixel.
     side: usize,
     threshold: u8,
@@ -31,7 +31,7 @@ const fn case(name: &'static str, background_mhz: f64, signal: f64, echoes: i32)
         background_hz: background_mhz * 1e6,
         signal,
         echoes,
-        breeds: 0.0,
+        secondaries: 0.0,
         side: 4,
         threshold: 0,
         differ: false,
@@ -39,7 +39,7 @@ const fn case(name: &'static str, background_mhz: f64, signal: f64, echoes: i32)
 }
 
 fn cases() -> [Case; 15] {
-    let breeds = 0.01;
+    let secondaries = 0.01;
     [
         case("8 Mcounts/s, 0.1", 8.0, 0.1, 1),
         case("26 Mcounts/s, 0.1", 26.0, 0.1, 1),
@@ -51,12 +51,17 @@ fn cases() -> [Case; 15] {
         case("8 Mcounts/s, 1 in six echoes", 8.0, 1.0, 6),
         case("80 Mcounts/s, 1", 80.0, 1.0, 1),
         Case {
-            breeds,
-            ..case("26 Mcounts/s, 3, 1 % breed", 26.0, 3.0, 1)
+            secondaries,
+            ..case("26 Mcounts/s, 3, 1 % secondaries", 26.0, 3.0, 1)
         },
         Case {
-            breeds,
-            ..case("26 Mcounts/s, 2 in two echoes, 1 % breed", 26.0, 2.0, 2)
+            secondaries,
+            ..case(
+                "26 Mcounts/s, 2 in two echoes, 1 % secondaries",
+                26.0,
+                2.0,
+                2,
+            )
         },
         Case {
             side: 2,
@@ -88,8 +93,8 @@ fn main() {
         };
         let exposure = Exposure::new(&config, 4800, CYCLES);
         let mut stream = stream_config(&config, &exposure, 1, Time::from_ps(1_900));
-        stream.spads.afterpulse_probability = case.breeds;
-        stream.spads.crosstalk_probability = case.breeds;
+        stream.spads.afterpulse_probability = case.secondaries;
+        stream.spads.crosstalk_probability = case.secondaries;
         let stream = PhotonStream::new(&stream);
         let law = WindowLaw::new(&config, &exposure);
         let pixels: Vec<LitPixel> = (0..PIXELS)

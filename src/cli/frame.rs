@@ -50,7 +50,7 @@ pub(super) struct FrameArgs {
     /// Run every macropixel on the cheapest engine that adds at most M metres of depth error on average.
     #[arg(long, value_name = "M", conflicts_with_all = ["engine", "no_skip"])]
     tolerance: Option<f64>,
-    /// Print all rows: kinds of errors, work, run times.
+    /// Print more rows: kinds of errors, simulated work, run times.
     #[arg(long)]
     verbose: bool,
     /// Draw and run everything, even what the engine could leave out: same histograms, more work.
@@ -138,11 +138,10 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
     if args.json {
         say_json(&report)?;
     } else {
-        let mut table = if args.verbose {
-            table::full(args, &settings, &timing, &frame)
-        } else {
-            table::brief(args, &settings, &timing, &frame)
-        };
+        let mut table = table::brief(args, &settings, &timing, &frame);
+        if args.verbose {
+            table::push_details(&mut table, args, &settings, &timing, &frame);
+        }
         if let Some(pair) = pair_report {
             pair.rows(&mut table);
         }

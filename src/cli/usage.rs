@@ -34,9 +34,10 @@ fn complaint(error: &clap::Error) -> Option<InputError> {
             let known = texts(ContextKind::ValidValue);
             let instead = || instead_of(value, known.iter().copied());
             if value.trim().is_empty() {
-                let cure = match known.is_empty() {
-                    true => "give one".to_owned(),
-                    false => instead(),
+                let cure = if known.is_empty() {
+                    "give one".to_owned()
+                } else {
+                    instead()
                 };
                 return Some(InputError::new(name, format!("has no value; {cure}")));
             }
@@ -72,12 +73,13 @@ fn complaint(error: &clap::Error) -> Option<InputError> {
         ErrorKind::ArgumentConflict => {
             let others = texts(ContextKind::PriorArg);
             let others: Vec<&str> = others.into_iter().map(bare).collect();
-            let message = match others.is_empty() || others.contains(&name) {
-                true => "is given twice; leave one of them out".to_owned(),
-                false => format!(
+            let message = if others.is_empty() || others.contains(&name) {
+                "is given twice; leave one of them out".to_owned()
+            } else {
+                format!(
                     "cannot be used with {}; leave one of them out",
                     others.join(", ")
-                ),
+                )
             };
             InputError::new(name, message)
         }

@@ -96,9 +96,10 @@ const LONG_S: f64 = 5.0;
 /// Says how long something takes, if that is long.
 pub(super) fn announce(what: &str, seconds: f64) {
     if seconds > LONG_S {
-        let time = match seconds < 120.0 {
-            true => format!("{seconds:.0} s"),
-            false => format!("{:.0} minutes", seconds / 60.0),
+        let time = if seconds < 120.0 {
+            format!("{seconds:.0} s")
+        } else {
+            format!("{:.0} minutes", seconds / 60.0)
         };
         let threads = counted(rayon::current_num_threads() as u64, "thread");
         note(format_args!("{what} takes about {time} on {threads}"));

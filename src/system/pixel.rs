@@ -139,8 +139,8 @@ pub struct PixelDepth {
     pub in_window: bool,
     /// Depth from the histogram, where its peak is significant and not saturated.
     pub measured_m: Option<f64>,
-    /// Standard deviation of that depth: the least that its counts allow (Cramér-Rao), with what its spread and other lights add; a bin where
-    /// the echo is saturated. `None` where range walk is not taken out, or the window cuts the echo off.
+    /// Standard deviation of that depth: the least that its counts allow (Cramér-Rao), with what its spread and other lights add; of a pulse
+    /// within a bin, that of all places which explain the counts; a bin where the echo is saturated. `None` where range walk is not taken out, or the window cuts the echo off.
     #[serde(default)]
     pub bound_m: Option<f64>,
     /// Standard deviation of the depths within the macropixel, from the width of its echo; `None` where there is no bound.

@@ -1,10 +1,14 @@
-//! Depths lie within five bounds of a surface that is really there, in five scenes, three lights of the sun and three of the laser.
+//! Depths lie within five bounds of a surface that is really there, in five scenes, three lights of the sun and three of the laser, and of a
+//! slanting wall in pulses shorter than a bin.
 //!
 //! The truth is the light that the macropixel gets: its echoes, those closer together than a pulse being one surface, with their mean by
 //! light. A third of the 45 frames is taken; `GDTOF_CASES=45 cargo test --release --test figures depths_keep` takes all of them, and
 //! prints every case.
 
+use std::sync::Arc;
+
 use guided_dtof::chip::{Exposure, Sensor, SensorConfig};
+use guided_dtof::guide::NoisyTruth;
 use guided_dtof::photon::{Echo, PixelLight};
 use guided_dtof::scene::{GroundTruth, Scene};
 use guided_dtof::system::{EngineKind, Frame, FrameSettings, take_frame};
@@ -14,25 +18,29 @@ const SCENES: [&str; 5] = ["street", "van", "fog", "glass", "night"];
 
 const SIZE: usize = 64;
 
+/// A frame of `size` by `size` macropixels and 1000 laser cycles.
+fn on_cohort(scene: Scene, size: usize) -> FrameSettings {
+    let sensor = Sensor::from(SensorConfig {
+        rows: size,
+        cols: size,
+        ..SensorConfig::default()
+    });
+    let exposure = Exposure::new(&sensor, 520, 1000);
+    FrameSettings {
+        engine: EngineKind::Cohort,
+        ..FrameSettings::new(sensor, scene, exposure)
+    }
+}
+
 /// A frame, and the light that made it.
 fn frame(scene: &str, klux: f64, energy_uj: f64) -> (Frame, GroundTruth, Vec<PixelLight>, f64) {
     let mut scene = Scene::named(scene).unwrap();
     scene.light.illuminance_klux = klux;
     scene.lidar.pulse_energy_uj = energy_uj;
-    let sensor = Sensor::from(SensorConfig {
-        rows: SIZE,
-        cols: SIZE,
-        ..SensorConfig::default()
-    });
-    let exposure = Exposure::new(&sensor, 520, 1000);
     let truth = GroundTruth::render(&scene, SIZE as u32, SIZE as u32);
     let light = scene.pixel_light(&truth);
     let apart_m = scene.pulse_resolution().as_range_m() * 2.355;
-    let settings = FrameSettings {
-        engine: EngineKind::Cohort,
-        ..FrameSettings::new(sensor, scene, exposure)
-    };
-    let frame = take_frame(&settings, |_| Vec::new(), |_| ()).unwrap();
+    let frame = take_frame(&on_cohort(scene, SIZE), |_| Vec::new(), |_| ()).unwrap();
     (frame, truth, light, apart_m)
 }
 
@@ -114,6 +122,53 @@ fn of_surfaces_that_are_there() {
     );
 }
 
+/// Errors and bounds of what has both, m.
+fn errors(frame: &Frame) -> Vec<(f64, f64)> {
+    let errors = frame.pixels.iter().filter_map(|pixel| {
+        let off_m = pixel.measured_m? - pixel.true_m?;
+        Some((off_m, pixel.bound_m?))
+    });
+    errors.collect()
+}
+
+/// A slanting wall, in bins of 2.6 ns.
+#[test]
+fn of_pulses_shorter_than_a_bin() {
+    let text = r#"
+        [[object]]
+        name = "wall"
+        kind = "plane"
+        centre_m = [0, 0, 30]
+        normal = [0.4, 0, -1]
+        width_m = 400
+        height_m = 400
+        reflectivity = 0.3
+        "#;
+    let (mut bounded, mut beyond, mut all) = (0, 0, 0);
+    for fwhm_ns in [0.0, 0.2, 0.5, 1.0, 2.0] {
+        for klux in [0.0, 50.0] {
+            for energy_uj in [1.0, 10.0, 100.0] {
+                let mut scene = Scene::parse("wall", text).unwrap();
+                scene.light.illuminance_klux = klux;
+                scene.lidar.pulse_energy_uj = energy_uj;
+                scene.lidar.pulse_fwhm_ns = fwhm_ns;
+                let settings = FrameSettings {
+                    guide: Arc::new(NoisyTruth::default()),
+                    ..on_cohort(scene, 24)
+                };
+                let frame = take_frame(&settings, |_| Vec::new(), |_| ()).unwrap();
+                let errors = errors(&frame);
+                let is_beyond = |(off_m, bound_m): &&(f64, f64)| off_m.abs() > 5.0 * bound_m;
+                all += frame.summary().depths;
+                bounded += errors.len();
+                beyond += errors.iter().filter(is_beyond).count();
+            }
+        }
+    }
+    println!("{beyond} of {bounded} depths with a bound, of {all}, are beyond five bounds");
+    assert!(1000 * beyond <= bounded && 100 * bounded > 95 * all);
+}
+
 /// A wall 30 m ahead, from a third of a photon to 4000 in a laser cycle.
 #[test]
 fn of_a_wall_in_any_light() {
@@ -131,23 +186,10 @@ fn of_a_wall_in_any_light() {
             let mut scene = Scene::parse("wall", text).unwrap();
             scene.light.illuminance_klux = klux;
             scene.lidar.pulse_energy_uj = energy_uj;
-            let sensor = Sensor::from(SensorConfig {
-                rows: 32,
-                cols: 32,
-                ..SensorConfig::default()
-            });
-            let exposure = Exposure::new(&sensor, 520, 1000);
-            let settings = FrameSettings {
-                engine: EngineKind::Cohort,
-                ..FrameSettings::new(sensor, scene, exposure)
-            };
-            let frame = take_frame(&settings, |_| Vec::new(), |_| ()).unwrap();
-            let judged = frame.pixels.iter().filter_map(|pixel| {
-                let off_m = pixel.measured_m? - pixel.true_m?;
-                Some((off_m, pixel.bound_m?))
-            });
+            let frame = take_frame(&on_cohort(scene, 32), |_| Vec::new(), |_| ()).unwrap();
             // A bound of a bin says so, and is none of the counts.
-            let of_counts = judged.filter(|(_, bound_m)| *bound_m < frame.bin_m);
+            let errors = errors(&frame).into_iter();
+            let of_counts = errors.filter(|(_, bound_m)| *bound_m < frame.bin_m);
             let all: Vec<(f64, f64)> = of_counts.collect();
             let mean = |of: &dyn Fn(&(f64, f64)) -> f64| {
                 all.iter().map(of).sum::<f64>() / all.len() as f64

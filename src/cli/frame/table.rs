@@ -125,32 +125,27 @@ fn safety(settings: &FrameSettings, frame: &Frame) -> Option<EyeSafety> {
     eye_safety_of(&settings.sensor, &settings.scene, laser_cycles, frame)
 }
 
-/// All of a frame, for `--verbose`.
-pub(super) fn full(
+/// The rest, for `--verbose`.
+pub(super) fn push_details(
+    table: &mut Table,
     args: &FrameArgs,
     settings: &FrameSettings,
     timing: &VerdictReport,
     frame: &Frame,
-) -> Table {
+) {
     let summary = frame.summary();
     let of = |part: usize, whole: usize| format!("{part} of {whole}");
-    let mut table = Table::new(format!("Frame of {}", scene_name(args)))
-        .row(
-            "macropixels that see a surface",
-            of(summary.with_target, summary.pixels),
-        )
-        .row(
-            match settings.sensor.mode {
-                Mode::Guided => "guided",
-                Mode::Conventional => "with the one window of the conventional mode",
-            },
-            of(summary.guided, summary.pixels),
-        )
-        .row("surface in window", of(summary.in_window, summary.guided));
+    table.push(
+        match settings.sensor.mode {
+            Mode::Guided => "guided",
+            Mode::Conventional => "with the one window of the conventional mode",
+        },
+        of(summary.guided, summary.pixels),
+    );
     if !args.exposure.guiding.guides.is_empty() {
         table.push("guide", settings.guide.name());
     }
-    quality::rows(&mut table, &settings.depth, &summary);
+    quality::rows(table, &settings.depth, &summary);
     let work = &frame.work;
     let percent = |part: f64, whole: f64| format!("{:.2} %", 100.0 * part / whole.max(1.0));
     table.push(
@@ -172,10 +167,6 @@ pub(super) fn full(
         of((work.macropixels - skipped) as usize, summary.pixels),
     );
     if let Some(kept) = &frame.kept {
-        table.push(
-            "depth error added, bound",
-            format!("{:.1e} m of {:.1e} m", kept.bound_m, kept.tolerance_m),
-        );
         table.push(
             "macropixels on window, cohort",
             format!("{}, {}", kept.on_window, kept.on_cohort),
@@ -216,22 +207,21 @@ pub(super) fn full(
         format!("{} bits, {}", frame.load_bits, frame.load_time),
     );
     table.push("readout", frame.readout_time);
-    table.push("exposure", frame.exposure_time);
-    let load = match settings.sensor.reset_to_load {
-        true => "windows are loaded between frames, after a reset",
-        false => "the load is hidden behind the frame before",
+    let load = if settings.sensor.reset_to_load {
+        "between frames, after a reset"
+    } else {
+        "hidden behind the frame before"
     };
-    table.push(
-        "frame after frame",
-        format!(
-            "{}, {load}",
-            settings.sensor.frame_time(frame.exposure_time)
-        ),
-    );
-    table.push("laser", eye_safety(settings, frame));
-    table.push("timing of the chip", timing_of(settings, timing));
+    table.push("windows are loaded", load);
+    if let Some(EyeSafety { rule, within_s, .. }) = safety(settings, frame) {
+        let frames_hz = 1.0 / frame_s(&settings.sensor, &settings.scene, frame);
+        let limit = format!(
+            "{}, within {within_s:.2e} s, at {frames_hz:.1} frames a second",
+            rule.name()
+        );
+        table.push("laser, what limits it", limit);
+    }
     table.push("timing, tightest", &timing.check);
-    probes(&mut table, args, frame);
     let times = &frame.times;
     table.push(
         "run time: load, gate level",
@@ -245,22 +235,4 @@ pub(super) fn full(
         "run time: probes, gate level",
         format!("{:.2} s", times.probes_s),
     );
-    table.push("run time: all", format!("{:.2} s", times.total_s()));
-    files(&mut table, args, frame);
-    table
-}
-
-/// How far the laser is from the limit of class 1, and what limits it.
-fn eye_safety(settings: &FrameSettings, frame: &Frame) -> String {
-    let judged = judged(settings, frame);
-    match safety(settings, frame) {
-        None => judged,
-        Some(EyeSafety { rule, within_s, .. }) => {
-            let frames_hz = 1.0 / frame_s(&settings.sensor, &settings.scene, frame);
-            format!(
-                "{judged} ({}, within {within_s:.2e} s), at {frames_hz:.1} frames a second",
-                rule.name()
-            )
-        }
-    }
 }

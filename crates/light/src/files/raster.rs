@@ -152,19 +152,20 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
 
 /// Refuses a header that promises more than `length` bytes of a file unpack to.
 fn check_length(what: &str, pixels: u64, pixel_bytes: usize, length: u64) -> Result<(), String> {
-    match pixels.saturating_mul(pixel_bytes as u64) > length.saturating_mul(MOST_UNPACKED) {
-        true => Err(cut_short(what)),
-        false => Ok(()),
+    if pixels.saturating_mul(pixel_bytes as u64) > length.saturating_mul(MOST_UNPACKED) {
+        return Err(cut_short(what));
     }
+    Ok(())
 }
 
 /// What readers say of a file that is cut short; of what else is wrong they speak in terms of the format.
 const ENDS_EARLY: [&str; 2] = ["unexpected end of file", "failed to fill whole buffer"];
 
 fn broken(what: &str, error: impl std::fmt::Display) -> String {
-    match ENDS_EARLY.contains(&error.to_string().as_str()) {
-        true => cut_short(what),
-        false => format!("is a broken {what}; save it again"),
+    if ENDS_EARLY.contains(&error.to_string().as_str()) {
+        cut_short(what)
+    } else {
+        format!("is a broken {what}; save it again")
     }
 }
 

@@ -38,7 +38,7 @@ pub enum WaveCycles {
 }
 
 /// Laser cycles that the simulation of a macropixel has at least, so that there is something to compare: a laser cycle of the gates takes
-/// about 0.4 ms.
+/// 0.3 ms.
 const LEAST_SIMULATED: i64 = 64;
 
 impl WaveCycles {

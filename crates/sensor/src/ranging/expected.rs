@@ -83,7 +83,8 @@ pub struct Response {
 }
 
 impl Response {
-    /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to pulses of this width, all jitter included.
+    /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to pulses of this width, all jitter included. A standard deviation below
+    /// 0.02 bins is taken for 0.02.
     pub fn new(config: &SensorConfig, bin_s: f64, pulse: impl Into<EchoWidth>) -> Self {
         let pulse = pulse.into();
         let (afterpulses, afterpulse_s) = config.afterpulses();

@@ -53,7 +53,8 @@ pub struct Sighting {
     /// The light that explains the peak, if range walk is taken out.
     pub light: Option<EchoLight>,
     /// Standard deviation of the position, bins: its Cramér-Rao bound under this light, or the distance to other lights that explain the
-    /// counts as well, and a fifth of the echo's spread; a bin where the counts tell no more ([`WalkLeft::ToABin`]).
+    /// counts as well, and a fifth of the echo's spread. Of a pulse shorter than 0.4 bins, that of all places which explain the counts. A bin where
+    /// the counts tell no more ([`WalkLeft::ToABin`]).
     pub bound_bins: Option<f64>,
     /// Why range walk is not taken out of a significant peak, where that was asked for.
     pub walk_left: Option<WalkLeft>,

@@ -110,7 +110,8 @@ pub struct Corrected {
     /// The most likely light; its position is without walk.
     pub light: EchoLight,
     /// Cramér-Rao bound of the position, bins: the least standard deviation of any unbiased estimate from counts of this light. Under a
-    /// THRESHOLD at least the distance to other lights with which the counts are about as likely.
+    /// THRESHOLD at least the distance to other lights with which the counts are about as likely. Of short pulses, the standard deviation of
+    /// all places that explain the counts.
     pub bound_bins: f64,
 }
 

@@ -153,8 +153,8 @@ impl Drawn {
 /// and 9.3 photons).
 const LITTLE: f64 = 2.0;
 
-/// The same where some photons breed: 26 Mcounts/s and 1 signal photon 83 and 91, 26 and 3 218 and 159 (2.7 and 4.7 photons).
-const LITTLE_WITH_BREEDING: f64 = 3.0;
+/// The same with afterpulses or crosstalk: 26 Mcounts/s and 1 signal photon 83 and 91, 26 and 3 218 and 159 (2.7 and 4.7 photons).
+const LITTLE_WITH_SECONDARIES: f64 = 3.0;
 
 /// Which part of a light of one layer breeds, if one does.
 const BREEDING: usize = 1;
@@ -268,7 +268,7 @@ impl<'a> Counting<'a> {
         }
         let expected = light.expected(&sight.plain.own) + light.expected(&sight.plain.previous);
         let little = match breeding {
-            Some(_) => LITTLE_WITH_BREEDING,
+            Some(_) => LITTLE_WITH_SECONDARIES,
             None => LITTLE,
         };
         let is_little = light.is_alone && expected <= little;
@@ -411,8 +411,8 @@ impl Pixel<'_> {
         }
     }
 
-    /// Whether any of the photons breed.
-    fn has_breeding(&self) -> bool {
+    /// Whether avalanches cause others.
+    fn has_secondaries(&self) -> bool {
         self.parts.iter().any(PixelStream::breeds)
     }
 

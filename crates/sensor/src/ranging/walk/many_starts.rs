@@ -42,9 +42,9 @@ impl WalkCorrection {
         let mut starts: Vec<(f64, EchoLight)> = Vec::new();
         // Where light makes bins count less, too, each light has its own places.
         let (step, fits) = match edge {
-            // With a THRESHOLD few bins count, and several lights may explain them.
             Some((bin, _)) if edge_is_seen(bin) && is_short => (0.1, 4),
             Some((bin, _)) if edge_is_seen(bin) && !has_threshold => (0.4, 2),
+            // With a THRESHOLD few bins count, and several lights may explain them.
             Some(_) => (0.2, 24),
             None => (0.2, 8),
         };
@@ -105,21 +105,23 @@ impl WalkCorrection {
             behind.then(a.deviance.total_cmp(&b.deviance))
         });
         let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
+        if is_short {
+            fits.retain(|fit| fit.deviance < best.deviance + UNLIKELY);
+            return Ok(fits);
+        }
         let is_another = |fit: &Fit| {
             let off = (fit.light.position_bins - best.light.position_bins).abs();
             fit.deviance < best.deviance + AS_GOOD
                 && off > ELSEWHERE * best.bound_bins.max(fit.bound_bins)
         };
-        let is_ambiguous = fits.iter().filter(|fit| fit.has_converged).any(is_another);
-        if is_short {
-            fits.retain(|fit| fit.deviance < best.deviance + UNLIKELY);
-            return Ok(fits);
+        if fits.iter().filter(|fit| fit.has_converged).any(is_another) {
+            return Err(WalkLeft::Ambiguous);
         }
-        match is_ambiguous {
-            true => Err(WalkLeft::Ambiguous),
-            false if has_threshold => Ok(vec![with_rivals(best, &fits, likelihood)]),
-            false => Ok(vec![best]),
-        }
+        Ok(vec![if has_threshold {
+            with_rivals(best, &fits, likelihood)
+        } else {
+            best
+        }])
     }
 
     /// The first bin of an echo's rising edge, and the photons of the echo until its end. Of a full bin these are not known: where pulses are
@@ -157,14 +159,15 @@ fn least_of(starts: &[(f64, EchoLight)]) -> Vec<(f64, EchoLight)> {
     least.map(|at| starts[at]).collect()
 }
 
-/// Standard deviations before which so much of a Gaussian pulse has come; no farther than its ends.
+/// Standard deviations before which this share of a Gaussian pulse has come; no farther than its ends.
 pub(super) fn quantile(share: f64) -> f64 {
     let (mut low, mut high) = (-6.0, 6.0);
     for _ in 0..20 {
         let middle = 0.5 * (low + high);
-        match share_before(middle).0 < share {
-            true => low = middle,
-            false => high = middle,
+        if share_before(middle).0 < share {
+            low = middle;
+        } else {
+            high = middle;
         }
     }
     0.5 * (low + high)
