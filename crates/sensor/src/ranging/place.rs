@@ -12,6 +12,7 @@
 
 use super::expected::EchoLight;
 use super::likelihood::{Fit, Likelihood};
+use super::walk::OF_A_WIDTH;
 
 /// Standard deviation of a pulse most of which lies within a bin, bins.
 pub(super) const SHORT: f64 = 0.4;
@@ -29,7 +30,7 @@ const NEAR: [f64; 8] = [-3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0];
 const DEPTHS: [f64; 3] = [0.1, 0.2, 0.4];
 
 /// Deviance by which a place may be less likely and still is within five bounds: of 2000 echoes one is beyond.
-pub(super) const UNLIKELY: f64 = 12.0;
+const UNLIKELY: f64 = 12.0;
 
 /// Deviance by which a place may be less likely and still have others behind it that count: chosen, e⁻³⁰ of the fit's likelihood.
 const FAR: f64 = 60.0;
@@ -70,22 +71,30 @@ pub(super) fn mean_place(places: &[Place]) -> (f64, f64) {
 }
 
 /// The fit of a short pulse with the mean of all its places: with the pulse's own width about each of the fits `narrow`, with that of `chosen`,
-/// and with those of surfaces that are somewhat deep.
+/// and with those of surfaces that are somewhat deep. If one of these explains the counts plainly better than `chosen`, the light is its.
 pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit) -> Fit {
-    let own = narrow.iter().flat_map(|fit| places_of(likelihood, fit));
+    let least = narrow.iter().map(|fit| fit.deviance);
+    let least = least.fold(chosen.deviance, f64::min);
+    let (first, others) = narrow.split_first().expect("a fit");
+    let likely = others.iter().filter(|fit| fit.deviance < least + UNLIKELY);
+    // The first one may have stopped where its place is flat.
+    let own = std::iter::once(first).chain(likely);
+    let own = own.flat_map(|fit| places_of(likelihood, fit));
     let [place, signal, background, _] = likelihood.free;
     let held = Likelihood {
         free: [place, signal, background, false],
         ..likelihood.clone()
     };
-    let first = narrow[0].light;
-    let deep = DEPTHS.map(|depth| {
+    let with_depth = |light: &EchoLight, depth: f64| {
         held.maximise(&EchoLight {
-            sigma_bins: libm::hypot(first.sigma_bins, depth),
-            ..first
+            sigma_bins: libm::hypot(light.sigma_bins, depth),
+            ..*light
         })
-    });
-    let is_wider = chosen.light.sigma_bins > first.sigma_bins;
+    };
+    let starts = narrow.iter().map(|fit| &fit.light);
+    let deep = starts.flat_map(|light| DEPTHS.map(|depth| with_depth(light, depth)));
+    let deep: Vec<Fit> = deep.collect();
+    let is_wider = chosen.light.sigma_bins > first.light.sigma_bins;
     let wider = deep.iter().chain(is_wider.then_some(chosen));
     // Where these tell no place either, those of the pulse's own width reach as far.
     let steep = wider.filter(|fit| fit.bound_bins < 0.5).map(|fit| Place {
@@ -101,7 +110,11 @@ pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit
         return *chosen;
     }
     let (position_bins, bound_bins) = mean_place(&places);
-    let mut averaged = *chosen;
+    let better = deep
+        .iter()
+        .filter(|fit| fit.deviance + OF_A_WIDTH < chosen.deviance);
+    let better = better.min_by(|a, b| a.deviance.total_cmp(&b.deviance));
+    let mut averaged = *better.unwrap_or(chosen);
     averaged.light.position_bins = position_bins;
     averaged.bound_bins = bound_bins;
     averaged

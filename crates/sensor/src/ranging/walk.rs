@@ -32,7 +32,7 @@ mod many_starts;
 const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 
 /// Deviance that a width of its own must save (Akaike).
-const OF_A_WIDTH: f64 = 2.0;
+pub(super) const OF_A_WIDTH: f64 = 2.0;
 
 /// Standard deviation with which a deep echo is sought, bins: chosen.
 const DEEP_BINS: f64 = 2.5;

@@ -11,7 +11,6 @@ use crate::chip::EventType;
 use crate::ranging::expected::{EchoLight, share_before};
 use crate::ranging::likelihood::{BESIDE, Fit, Likelihood};
 use crate::ranging::peak::Peak;
-use crate::ranging::place::UNLIKELY;
 
 /// Ambiguity: another light whose deviance is larger by less than [`AS_GOOD`], at a place more than [`ELSEWHERE`]
 /// bounds away.
@@ -27,8 +26,7 @@ const RIVAL: f64 = 1.0;
 const FAR: f64 = 30.0;
 
 impl WalkCorrection {
-    /// The best of fits from many starts: for each of many signals the best place. Behind it are those that may be it as well, where
-    /// pulses are short.
+    /// The best of fits from many starts: for each of many signals the best place. Behind it are the others, where pulses are short.
     pub(super) fn of_many(
         &self,
         likelihood: &Likelihood<'_>,
@@ -106,7 +104,6 @@ impl WalkCorrection {
         });
         let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
         if is_short {
-            fits.retain(|fit| fit.deviance < best.deviance + UNLIKELY);
             return Ok(fits);
         }
         let is_another = |fit: &Fit| {
