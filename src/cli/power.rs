@@ -255,7 +255,7 @@ fn pulses(config: &SensorConfig, exposure: &Exposure, counts_hz: f64) -> Vec<Spa
         })
         .collect();
     pulses.sort_unstable();
-    apply_dead_time(&mut pulses, config.dead_time());
+    apply_dead_time(&mut pulses, &config.spad_model(), 0);
     pulses
 }
 

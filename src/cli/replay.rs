@@ -204,7 +204,7 @@ impl Summary {
                 "{} photons cancel: two of one SPAD within a CLK period ({}) undo each other in the front end; a dead time ({}) no shorter than the period prevents it",
                 self.photons_that_cancel,
                 config.clock().period(),
-                config.dead_time(),
+                config.pulse_width(),
             ));
         }
     }

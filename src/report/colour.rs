@@ -19,7 +19,7 @@ const STOPS: [Rgb; 6] = [
 ];
 
 /// What has no depth: greys for what was not looked at, reds for what was looked at in vain. Neighbours differ in lightness.
-pub(super) const CATEGORY_COLOURS: [Rgb; 7] = [
+pub(super) const CATEGORY_COLOURS: [Rgb; 8] = [
     [226, 226, 226],
     [160, 160, 160],
     [100, 100, 100],
@@ -27,6 +27,7 @@ pub(super) const CATEGORY_COLOURS: [Rgb; 7] = [
     [246, 146, 200],
     [190, 20, 60],
     [255, 120, 60],
+    [120, 40, 140],
 ];
 
 /// The colour at `position` of the scale, 0 (nearest) to 1 (farthest); clamped, NaN is nearest.

@@ -132,6 +132,10 @@ impl<'a> Subject<'a> {
                 let message = "theory is of Gaussian pulses; leave this out, or study frames";
                 return Err(InputError::new(format!("scene.lidar.{key}"), message));
             }
+            if world.sensor.dead_time_spread > 0.0 {
+                let message = "theory is of SPADs that are alike; leave this out, or study frames";
+                return Err(InputError::new("sensor.dead_time_spread", message));
+            }
             let wall = Box::new(Wall::new(world.rig, &asked));
             return Ok(Ready {
                 key: key(&format!("{wall:?}")),
@@ -402,18 +406,20 @@ mod tests {
     }
 
     #[test]
-    fn theory_refuses_pulses_that_are_not_gaussian_by_their_key() {
-        let study = study(
-            "[study]\nkind = \"theory\"\n[fixed]\nscene.lidar.spad_tail_ps = 300\n[vary]\nscene.lidar.spad_tail_share = [0, 0.1]\n",
-        );
-        let subject = Subject::new(&study);
-        let ready = |index| subject.ready(&study.point(index), &mut Scratch::default());
-        assert!(ready(0).is_ok());
-        let refusal = ready(1).err().unwrap().to_string();
-        assert!(
-            refusal.contains("scene.lidar.spad_tail_share: theory is of Gaussian pulses"),
-            "{refusal}"
-        );
+    fn theory_refuses_by_its_key_what_it_leaves_out() {
+        for (key, what) in [
+            ("scene.lidar.spad_tail_share", "Gaussian pulses"),
+            ("sensor.dead_time_spread", "SPADs that are alike"),
+        ] {
+            let fixed = "[study]\nkind = \"theory\"\n[fixed]\nscene.lidar.spad_tail_ps = 300\n";
+            let study = study(&format!("{fixed}[vary]\n{key} = [0, 0.1]\n"));
+            let subject = Subject::new(&study);
+            let ready = |index| subject.ready(&study.point(index), &mut Scratch::default());
+            assert!(ready(0).is_ok());
+            let refusal = ready(1).err().unwrap().to_string();
+            let named = format!("{key}: theory is of {what}");
+            assert!(refusal.contains(&named), "{refusal}");
+        }
     }
 
     fn keys(text: &str) -> Vec<Key> {

@@ -28,11 +28,13 @@ pub enum NoDepth {
     OutsideWindow,
     /// The surface lies in the window, and no peak is significant.
     NoSignificantPeak,
+    /// The echo seems to come from behind the lidar, by more than its bound.
+    BehindLidar,
 }
 
 impl NoDepth {
     /// Every reason, in their order.
-    pub const ALL: [NoDepth; 7] = [
+    pub const ALL: [NoDepth; 8] = [
         NoDepth::NoSurface,
         NoDepth::NoGuide,
         NoDepth::OutOfReach,
@@ -40,6 +42,7 @@ impl NoDepth {
         NoDepth::Saturated,
         NoDepth::OutsideWindow,
         NoDepth::NoSignificantPeak,
+        NoDepth::BehindLidar,
     ];
 
     /// The reason as a number in arrays: its place in [`NoDepth::ALL`] from 1 on, and 0 where there is a depth.
@@ -57,6 +60,7 @@ impl NoDepth {
             NoDepth::Saturated => "saturated",
             NoDepth::OutsideWindow => "target outside window",
             NoDepth::NoSignificantPeak => "no significant peak",
+            NoDepth::BehindLidar => "echo from behind the lidar",
         }
     }
 }
@@ -196,7 +200,7 @@ mod tests {
     #[test]
     fn reasons_are_numbered_in_their_order() {
         let numbers = NoDepth::ALL.map(|why| NoDepth::number(Some(why)));
-        assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 7, 8]);
         assert_eq!(NoDepth::number(None), 0);
     }
 }

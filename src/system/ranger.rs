@@ -128,18 +128,23 @@ impl<'a> Ranger<'a> {
         let sighting = window.and_then(|_| place.find(&self.finder, &counts));
         let found = sighting.filter(|s| s.is_significant && !s.is_saturated);
         let range_m = |bins: f64, at: usize| place.range_m(window?, &counts, bins, at);
+        let to_m = |bins: f64| bins * self.bin_m();
+        let in_front = |depth_m, bound_bins: Option<f64>| {
+            in_front(depth_m, bound_bins.map(to_m), self.bin_m())
+        };
+        let of_fit = found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin));
+        let told = of_fit.and_then(|depth_m| in_front(depth_m, found?.bound_bins));
+        let is_behind = of_fit.is_some() && told.is_none();
+        let found = found.filter(|_| !is_behind);
+        let (measured_m, bound_m) = told.unzip();
+        let bound_m = bound_m.flatten();
         let no_depth = match sighting {
             _ if found.is_some() => None,
+            _ if is_behind => Some(NoDepth::BehindLidar),
             _ if start.is_none() => Some(NoDepth::NoGuide),
             Some(sighting) if sighting.is_saturated => Some(NoDepth::Saturated),
             _ => Some(NoDepth::NoSignificantPeak),
         };
-        let measured_m = found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin));
-        // Nothing is behind the lidar; a fit that says so is off by as much at least.
-        let behind_m = measured_m.map_or(0.0, |measured_m| (-measured_m).max(0.0));
-        let bound_m = found.and_then(|s| Some((s.bound_bins? * self.bin_m()).max(behind_m)));
-        let measured_m = measured_m.map(|measured_m| measured_m.max(0.0));
-        let to_m = |bins: f64| bins * self.bin_m();
         let spread_m = found.filter(|s| s.bound_bins.is_some()).and_then(|s| {
             let spread_bins = self.finder.spread_bins(&s.light?)?;
             Some(to_m(spread_bins))
@@ -157,10 +162,12 @@ impl<'a> Ranger<'a> {
         let others = found.into_iter().flat_map(|s| s.others).flatten();
         let others = others.filter_map(|other| {
             let at = other.position_bins.round().max(0.0) as usize;
-            let depth_m = range_m(other.position_bins, at.min(counts.len() - 1))?;
+            let at = at.min(counts.len() - 1);
+            let depth_m = range_m(other.position_bins, at)?;
+            let (depth_m, bound_m) = in_front(depth_m, other.bound_bins)?;
             Some(Return {
-                depth_m: depth_m.max(0.0),
-                bound_m: other.bound_bins.map(to_m),
+                depth_m,
+                bound_m,
                 spread_m: other.spread_bins.map(to_m),
                 photons: other.photons,
                 confidence: other.confidence,
@@ -205,7 +212,7 @@ impl<'a> Ranger<'a> {
             _ if start.is_none() && guide_m.is_none() => NoDepth::NoGuide,
             _ if start.is_none() => NoDepth::OutOfReach,
             _ if !self.spads_fire => NoDepth::SpadsOff,
-            NoDepth::Saturated => NoDepth::Saturated,
+            NoDepth::Saturated | NoDepth::BehindLidar => seen,
             _ if !in_window => NoDepth::OutsideWindow,
             _ => NoDepth::NoSignificantPeak,
         });
@@ -241,6 +248,22 @@ impl<'a> Ranger<'a> {
     }
 }
 
+/// Bounds within which a depth behind the lidar may be one at the lidar.
+const WITHIN_BOUNDS: f64 = 5.0;
+
+/// What is told of a depth that a fit may have put behind the lidar: nothing is there. Up to five bounds behind, or a bin where there is no bound,
+/// the depth is 0, and off by as much at least; `None` beyond.
+fn in_front(depth_m: f64, bound_m: Option<f64>, bin_m: f64) -> Option<(f64, Option<f64>)> {
+    let behind_m = (-depth_m).max(0.0);
+    let most_m = bound_m.map_or(bin_m, |bound_m| WITHIN_BOUNDS * bound_m);
+    (behind_m <= most_m).then(|| {
+        (
+            depth_m.max(0.0),
+            bound_m.map(|bound_m| bound_m.max(behind_m)),
+        )
+    })
+}
+
 /// What a histogram says, and through which window.
 struct Sight<'l> {
     reading: Reading,
@@ -262,7 +285,7 @@ pub struct Reading {
     pub returns: Returns,
     /// Why range walk is left in it.
     pub walk_left: Option<WalkLeft>,
-    /// Why there is none: no guide (SPADs are off), saturated, or no significant peak.
+    /// Why there is none: no guide (SPADs are off), saturated, no significant peak, or an echo from behind the lidar.
     pub no_depth: Option<NoDepth>,
     /// Distance of the histogram's peak with its range walk, significant or not, m.
     pub peak_m: Option<f64>,
@@ -317,4 +340,20 @@ pub fn range_counts(
     let ranger = Ranger::new(sensor, exposure, scene, options, calibration)?;
     let reading = |pixel, counts: &[u16]| ranger.sight(pixel, starts[pixel], counts).reading;
     Ok(ranger.of_array(counts, reading))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_depth_is_behind_the_lidar_by_more_than_its_bound_or_not_at_all() {
+        let in_front = |depth_m, bound_m| in_front(depth_m, bound_m, 0.4);
+        assert_eq!(in_front(0.1, Some(0.02)), Some((0.1, Some(0.02))));
+        assert_eq!(in_front(-0.01, Some(0.02)), Some((0.0, Some(0.02))));
+        assert_eq!(in_front(-0.09, Some(0.02)), Some((0.0, Some(0.09))));
+        assert_eq!(in_front(-0.11, Some(0.02)), None);
+        assert_eq!(in_front(-0.39, None), Some((0.0, None)));
+        assert_eq!(in_front(-0.41, None), None);
+    }
 }

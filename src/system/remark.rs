@@ -54,6 +54,9 @@ impl Circumstances<'_> {
             NoDepth::Saturated => self.saturated(),
             NoDepth::OutsideWindow => self.outside_window(),
             NoDepth::NoSignificantPeak => self.no_significant_peak(),
+            NoDepth::BehindLidar => {
+                "a fit puts these echoes before the laser's pulse; light so near or so strong does not tell its place".to_owned()
+            }
         };
         let (name, count) = (commonest.name(), without(commonest));
         Some(format!(

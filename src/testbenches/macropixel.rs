@@ -233,7 +233,7 @@ fn two_windows(
         })
         .collect();
     pulses.sort_unstable();
-    apply_dead_time(&mut pulses, config.dead_time());
+    apply_dead_time(&mut pulses, &config.spad_model(), 0);
 
     let lists = [&pulses[..], &pulses[..]];
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &starts, &lists);

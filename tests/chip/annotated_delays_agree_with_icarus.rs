@@ -35,7 +35,7 @@ fn compare(seed: u64, sdf: impl FnOnce(&Netlist, &Timing, &mut StdRng) -> String
         })
         .collect();
     pulses.sort_unstable();
-    apply_dead_time(&mut pulses, config.dead_time());
+    apply_dead_time(&mut pulses, &config.spad_model(), 0);
     let pulses = [&pulses[..]];
 
     let netlist = Netlist::elaborate(&array::circuit(&config));

@@ -98,7 +98,7 @@ fn cases() -> impl Strategy<Value = Case> {
                     })
                     .collect();
                 pulses.sort_unstable();
-                apply_dead_time(&mut pulses, config.dead_time());
+                apply_dead_time(&mut pulses, &config.spad_model(), 0);
                 // Mostly start values that come within the laser cycle.
                 let start = if start & 3 == 0 {
                     start

@@ -377,7 +377,7 @@ proptest! {
         let events = times.iter().map(|&(fs, spad)| SpadEvent { time: Time::from_fs(fs), spad });
         let mut pulses: Vec<SpadEvent> = events.filter(|e| e.time < exposure.end()).collect();
         pulses.sort_unstable();
-        apply_dead_time(&mut pulses, config.dead_time());
+        apply_dead_time(&mut pulses, &config.spad_model(), 0);
 
         let law = WindowLaw::new(&config, &exposure);
         let latency = law.timing().spad_to_sampled;

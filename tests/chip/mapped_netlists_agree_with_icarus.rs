@@ -56,7 +56,7 @@ fn compare(mapped: &Mapped, seed: u64) -> (usize, usize) {
         })
         .collect();
     pulses.sort_unstable();
-    apply_dead_time(&mut pulses, config.dead_time());
+    apply_dead_time(&mut pulses, &config.spad_model(), 0);
     let start = random.random_range(20..40);
     let mut gate = GateSimulation::new(config, &exposure, (0, 0), (1, 1), &[start], &[&pulses]);
 

@@ -19,7 +19,7 @@ fn pulses(config: &SensorConfig, exposure: &Exposure, count: i64) -> Vec<SpadEve
         })
         .collect();
     pulses.sort_unstable();
-    apply_dead_time(&mut pulses, config.dead_time());
+    apply_dead_time(&mut pulses, &config.spad_model(), 0);
     pulses
 }
 

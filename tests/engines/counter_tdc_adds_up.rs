@@ -12,7 +12,7 @@ use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, LitPixel, NotModelled, PulsedPixel,
     Replay, Runner, Timed, Window, full_stream, stream_config,
 };
-use guided_dtof::photon::{PhotonStream, PixelLight, SpadEvent, apply_dead_time};
+use guided_dtof::photon::{PhotonStream, PixelLight, SpadEvent, SpadModel, apply_dead_time};
 use guided_dtof::units::Time;
 use proptest::prelude::*;
 
@@ -86,7 +86,7 @@ fn pulses(
             .filter(|pulse| pulse.time.as_fs() < end_fs)
             .collect();
         pulses.sort_unstable();
-        apply_dead_time(&mut pulses, dead_time);
+        apply_dead_time(&mut pulses, &SpadModel::with_dead_time(dead_time), 0);
         pulses
     })
 }

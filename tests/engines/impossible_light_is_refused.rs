@@ -5,7 +5,8 @@ use guided_dtof::engine::{
     Cohort, CohortOptions, EngineError, Expose, LitPixel, Window, full_stream, stream_config,
 };
 use guided_dtof::photon::{
-    Echo, LightError, PhotonStream, PixelLight, Profile, PulseShape, SpadSpread,
+    Echo, LightError, PhotonStream, PixelLight, Profile, PulseShape, SpadModel, SpadSpread,
+    StreamConfig,
 };
 use guided_dtof::units::Time;
 
@@ -26,6 +27,22 @@ fn what_an_engine_cannot_follow_it_refuses_by_name() {
     let cohort = Cohort::new(&config, &exposure, CohortOptions::default());
     let differing = pixels(light.clone().with_spads(spread(16)));
     let refused = cohort.expose(&stream, &differing).unwrap_err();
+    assert!(
+        refused.to_string().contains("SPADs that differ"),
+        "{refused}"
+    );
+    let alike = LitPixel {
+        light: Some(light.clone()),
+        ..differing[0].clone()
+    };
+    let unequal = PhotonStream::new(&StreamConfig {
+        spads: SpadModel {
+            dead_time_spread: 0.1,
+            ..stream.config().spads
+        },
+        ..stream.config().clone()
+    });
+    let refused = cohort.expose(&unequal, &[alike]).unwrap_err();
     assert!(
         refused.to_string().contains("SPADs that differ"),
         "{refused}"

@@ -184,7 +184,7 @@ fn add_photons_at_edges(scenario: &mut Scenario, law: &WindowLaw) {
             }
         }
         pulses.sort_unstable();
-        apply_dead_time(pulses, scenario.config.dead_time());
+        apply_dead_time(pulses, &scenario.config.spad_model(), 0);
     }
 }
 

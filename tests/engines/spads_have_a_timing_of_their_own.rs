@@ -1,4 +1,4 @@
-//! Jitter and late avalanches: engines count the same photons, or refuse by name; zero changes nothing.
+//! Jitter, late avalanches and dead times: engines count the same photons, or refuse by name; zero changes nothing.
 
 use guided_dtof::chip::{Exposure, Sensor, SensorConfig, WindowLaw};
 use guided_dtof::engine::{
@@ -29,10 +29,14 @@ struct Bench {
 
 impl Bench {
     fn new(lidar: &str, laser_cycles: u32, seed: u64) -> Self {
+        Self::of(SensorConfig::default(), lidar, laser_cycles, seed)
+    }
+
+    fn of(config: SensorConfig, lidar: &str, laser_cycles: u32, seed: u64) -> Self {
         let config = SensorConfig {
             rows: 2,
             cols: 2,
-            ..SensorConfig::default()
+            ..config
         };
         let exposure = Exposure::new(&config, 80, laser_cycles);
         let sensor = Sensor::new(config).unwrap();
@@ -89,6 +93,53 @@ fn which_gate_cycle_and_window_count_alike() {
             by_window,
             "{lidar}"
         );
+    }
+}
+
+#[test]
+fn unequal_dead_times_count_alike_or_are_refused() {
+    let alike = SensorConfig {
+        dead_time_ns: 20.0,
+        ..SensorConfig::default()
+    };
+    let paralysable = SensorConfig {
+        paralysable: true,
+        ..alike.clone()
+    };
+    let with_secondaries = SensorConfig {
+        afterpulse_probability: 0.1,
+        crosstalk_probability: 0.1,
+        ..alike.clone()
+    };
+    // Of the sun's light and of an echo that blinds; drawn by laser cycle where it is strong.
+    for pulse_energy_uj in [5e-4, 0.02] {
+        let bench = |config: SensorConfig| {
+            let mut bench = Bench::of(config, "", 200, 3);
+            bench.scene.lidar.pulse_energy_uj = pulse_energy_uj;
+            bench
+        };
+        for config in [&alike, &paralysable, &with_secondaries] {
+            let usual = bench(config.clone()).by_window();
+            let spread = |dead_time_seed| {
+                bench(SensorConfig {
+                    dead_time_spread: 0.2,
+                    dead_time_seed,
+                    ..config.clone()
+                })
+            };
+            let bench = spread(1);
+            let (sensor, exposure) = (&bench.sensor, &bench.exposure);
+            let by_window = bench.by_window();
+            assert_ne!(by_window, usual);
+            assert_ne!(by_window, spread(2).by_window());
+            let by_gate = bench.counts(&Gate::new(sensor, exposure)).unwrap();
+            assert_eq!(by_gate, by_window);
+            let by_cycle = bench.counts(&Cycle::new(sensor, exposure)).unwrap();
+            assert_eq!(by_cycle, by_window);
+            let cohort = Cohort::new(sensor, exposure, CohortOptions::default());
+            let refusal = EngineError::NotInCohorts(NotModelled::SpadsThatDiffer);
+            assert_eq!(bench.counts(&cohort).unwrap_err(), refusal);
+        }
     }
 }
 

@@ -49,8 +49,8 @@ impl Scenario {
         let most = config.largest_start().min(most as u16);
         let pixels = config.pixels();
         let starts = (0..pixels).map(|_| random.random_range(0..=most)).collect();
-        let pulses = (0..pixels)
-            .map(|_| {
+        let pulses = (0..pixels as u32)
+            .map(|pixel| {
                 let mut pulses: Vec<SpadEvent> = (0..random.random_range(0..200))
                     .map(|_| SpadEvent {
                         time: Time::from_fs(random.random_range(0..exposure.end().as_fs())),
@@ -58,7 +58,7 @@ impl Scenario {
                     })
                     .collect();
                 pulses.sort_unstable();
-                apply_dead_time(&mut pulses, config.dead_time());
+                apply_dead_time(&mut pulses, &config.spad_model(), pixel);
                 pulses
             })
             .collect();

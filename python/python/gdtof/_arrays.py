@@ -35,11 +35,18 @@ class Reason(IntEnum):
     """The surface lies outside the window, and no peak is significant."""
     NO_SIGNIFICANT_PEAK = 7
     """The surface lies in the window, and no peak is significant."""
+    BEHIND_LIDAR = 8
+    """The echo seems to come from behind the lidar, by more than its bound."""
 
 
 def reason_name(reason: Reason) -> str:
     """As the tables of `gdtof frame` have it."""
-    words = {Reason.DEPTH: "depth", Reason.SPADS_OFF: "SPADs off", Reason.OUTSIDE_WINDOW: "target outside window"}
+    words = {
+        Reason.DEPTH: "depth",
+        Reason.SPADS_OFF: "SPADs off",
+        Reason.OUTSIDE_WINDOW: "target outside window",
+        Reason.BEHIND_LIDAR: "echo from behind the lidar",
+    }
     return words.get(reason, reason.name.lower().replace("_", " "))
 
 

@@ -64,7 +64,7 @@ class Ranged:
     confidence: NDArray[np.float64]
     """-log10 of the chance that light without an echo makes such a peak; NaN where there is no peak."""
     reason: NDArray[np.uint8]
-    """A :class:`Reason`: depth, no guide (SPADs are off), saturated, or no significant peak."""
+    """A :class:`Reason`: depth, no guide (SPADs are off), saturated, no significant peak, or an echo from behind the lidar."""
 
 
 def expose(

@@ -249,7 +249,7 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming, read: &ReadTi
         }),
         (Probe::Hit.name(), &local.netlist, &local.counts, &|_| None),
         ("SPAD_RAW", &local.netlist, &local.toggles, &|r| {
-            local.toggle_slack(r, config.dead_time())
+            local.toggle_slack(r, config.pulse_width())
         }),
         ("LOAD_CLK", &load.netlist, &load.load_clk, &|r| {
             Some(r.slack(load_period))

@@ -43,6 +43,8 @@ pub struct Avalanches<'a> {
     model: &'a SpadModel,
     key: [u32; 2],
     pixel: u32,
+    /// Of each SPAD, where they differ.
+    dead_times: &'a [Time],
     /// Until when each SPAD is blind, at the latest.
     blind_until: SmallVec<[Time; FEW_SPADS]>,
     /// SPADs that may be ready before that.
@@ -55,12 +57,18 @@ pub struct Avalanches<'a> {
 
 impl<'a> Avalanches<'a> {
     /// SPADs that were in the dark before the first photon. `key` is that of the photon stream, `pixel` the number of the
-    /// macropixel in it.
-    pub(crate) fn in_the_dark(model: &'a SpadModel, key: [u32; 2], pixel: u32) -> Self {
+    /// macropixel in it, `dead_times` are those of [`SpadModel::dead_times`].
+    pub(crate) fn in_the_dark(
+        model: &'a SpadModel,
+        key: [u32; 2],
+        pixel: u32,
+        dead_times: &'a [Time],
+    ) -> Self {
         Avalanches {
             model,
             key,
             pixel,
+            dead_times,
             blind_until: smallvec![Time::from_fs(i64::MIN / 2); model.grid.spads()],
             unknown: 0,
             pending: BinaryHeap::new(),
@@ -74,12 +82,15 @@ impl<'a> Avalanches<'a> {
         model: &'a SpadModel,
         key: [u32; 2],
         pixel: u32,
+        dead_times: &'a [Time],
         time: Time,
         breeding: impl Iterator<Item = Photon>,
     ) -> Self {
-        let mut avalanches = Self::in_the_dark(model, key, pixel);
-        let blind_until = time - Time::from_fs(1) + model.dead_time;
-        avalanches.blind_until.fill(blind_until);
+        let mut avalanches = Self::in_the_dark(model, key, pixel, dead_times);
+        for spad in 0..avalanches.blind_until.len() {
+            let dead_time = avalanches.dead_time_of(spad);
+            avalanches.blind_until[spad] = time - Time::from_fs(1) + dead_time;
+        }
         avalanches.unknown = u64::MAX;
         for photon in breeding {
             avalanches.breed(photon, false);
@@ -88,6 +99,12 @@ impl<'a> Avalanches<'a> {
             .pending
             .retain(|Reverse((child, _))| child.time >= time);
         avalanches
+    }
+
+    #[inline]
+    fn dead_time_of(&self, spad: usize) -> Time {
+        let own = self.dead_times.get(spad);
+        own.copied().unwrap_or(self.model.dead_time)
     }
 
     /// Runs all `photons`, sorted, and what they cause; appends the rising edges to `edges` and returns how many avalanches
@@ -175,9 +192,14 @@ impl<'a> Avalanches<'a> {
                 self.lost += 1;
             }
             if is_ready || is_paralysable {
-                let mut until = before.max(time + self.model.dead_time);
+                let mut until = before.max(time + self.dead_time_of(spad.into()));
                 if let Some(echoes) = echoes {
-                    until = echoes.blind(spad, before.max(time), until);
+                    until = echoes.blind(
+                        spad,
+                        self.dead_time_of(spad.into()),
+                        before.max(time),
+                        until,
+                    );
                 }
                 self.blind_until[usize::from(spad)] = until;
             }
@@ -193,7 +215,7 @@ impl<'a> Avalanches<'a> {
         if time >= wanted_from || source == Source::Echo {
             return Err(Unknown);
         }
-        self.blind_until[usize::from(spad)] = before.max(time + self.model.dead_time);
+        self.blind_until[usize::from(spad)] = before.max(time + self.dead_time_of(spad.into()));
         self.unknown |= 1 << spad;
         if breeds {
             self.breed(photon, false);
@@ -204,7 +226,8 @@ impl<'a> Avalanches<'a> {
     /// Notes what an avalanche causes.
     fn breed(&mut self, parent: Photon, is_certain: bool) {
         let parent = SpadEvent::new(parent.time, parent.spad);
-        let children = self.model.children(self.key, self.pixel, parent);
+        let dead_time = self.dead_time_of(parent.spad.into());
+        let children = self.model.children(self.key, self.pixel, dead_time, parent);
         self.pending
             .extend(children.map(|child| Reverse((child, is_certain))));
     }
@@ -220,26 +243,31 @@ impl PixelStream<'_> {
     ) -> Avalanches<'_> {
         let (model, key) = (&self.stream.config().spads, self.stream.key());
         match time {
-            Some(time) => Avalanches::known_from(model, key, self.pixel, time, breeding),
-            None => Avalanches::in_the_dark(model, key, self.pixel),
+            Some(time) => {
+                let (pixel, dead_times) = (self.pixel, &self.dead_times);
+                Avalanches::known_from(model, key, pixel, dead_times, time, breeding)
+            }
+            None => Avalanches::in_the_dark(model, key, self.pixel, &self.dead_times),
         }
     }
 }
 
 /// Removes the events that fall into the (non-paralysable) dead time of their SPAD; returns how many.
 ///
-/// `events` must be sorted by (time, SPAD) with times from 0 on. An event stays if and only if it
-/// is strictly later than the SPAD's last kept event plus `dead_time`. With a dead time of zero
+/// `events` of macropixel number `pixel` must be sorted by (time, SPAD) with times from 0 on. An event stays if and only if it
+/// is strictly later than the SPAD's last kept event plus its dead time. With a dead time of zero
 /// only exact coincidences on one SPAD are removed.
-pub fn apply_dead_time(events: &mut Vec<SpadEvent>, dead_time: Time) -> u64 {
+pub fn apply_dead_time(events: &mut Vec<SpadEvent>, spads: &SpadModel, pixel: u32) -> u64 {
     let model = SpadModel {
         // Events may be of any SPADs there are.
         grid: SpadGrid::new(8, 8),
-        ..SpadModel::with_dead_time(dead_time)
+        law: DeadTimeLaw::NonParalysable,
+        ..*spads
     };
     let photons: Vec<Photon> = events.iter().map(|&event| event.into()).collect();
     events.clear();
-    Avalanches::in_the_dark(&model, [0; 2], 0).run_to_the_end(&photons, events)
+    let dead_times = model.dead_times(pixel);
+    Avalanches::in_the_dark(&model, [0; 2], pixel, &dead_times).run_to_the_end(&photons, events)
 }
 
 #[cfg(test)]
@@ -262,6 +290,7 @@ mod tests {
             afterpulse_probability in 0.0f64..1.0,
             crosstalk_probability in 0.0f64..1.0,
             paralysable: bool,
+            dead_time_spread in prop::sample::select(vec![0.0, 0.2]),
         ) {
             let law = if paralysable { DeadTimeLaw::Paralysable } else { DeadTimeLaw::NonParalysable };
             let model = SpadModel {
@@ -269,6 +298,7 @@ mod tests {
                 afterpulse_probability,
                 afterpulse_time: Time::from_fs(500),
                 crosstalk_probability,
+                dead_time_spread,
                 ..SpadModel::with_dead_time(Time::from_fs(dead_fs))
             };
             let mut photons: Vec<Photon> = raw
@@ -278,11 +308,12 @@ mod tests {
             photons.sort();
             let (from, wanted_from) = (Time::from_fs(from_fs), Time::from_fs(from_fs + wait_fs));
             let mut all = Vec::new();
-            Avalanches::in_the_dark(&model, [7, 8], 1).run_to_the_end(&photons, &mut all);
+            let dead_times = model.dead_times(1);
+            Avalanches::in_the_dark(&model, [7, 8], 1, &dead_times).run_to_the_end(&photons, &mut all);
             let (before, known) = photons.split_at(photons.partition_point(|p| p.time < from));
             let since = from - model.reach();
             let breeding = before.iter().filter(|p| p.breeds && p.time >= since).copied();
-            let mut avalanches = Avalanches::known_from(&model, [7, 8], 1, from, breeding);
+            let mut avalanches = Avalanches::known_from(&model, [7, 8], 1, &dead_times, from, breeding);
             let mut edges = Vec::new();
             let forever = Time::from_fs(i64::MAX);
             if avalanches.run(known, None, forever, wanted_from, &mut edges).is_ok() {
@@ -294,13 +325,34 @@ mod tests {
     }
 
     #[test]
+    fn every_spad_has_its_own_dead_time() {
+        let spads = SpadModel {
+            dead_time_spread: 0.2,
+            ..SpadModel::with_dead_time(Time::from_fs(1000))
+        };
+        for pixel in [0, 7] {
+            let flood = (0..20_000).flat_map(|time_fs| (0..4).map(move |n| event(time_fs, n)));
+            let mut edges: Vec<SpadEvent> = flood.collect();
+            apply_dead_time(&mut edges, &spads, pixel);
+            for spad in 0..4 {
+                let own: Vec<_> = edges.iter().filter(|edge| edge.spad == spad).collect();
+                let apart = spads.dead_time_of(pixel, spad) + Time::from_fs(1);
+                assert!(
+                    own.windows(2)
+                        .all(|pair| pair[1].time - pair[0].time == apart)
+                );
+            }
+        }
+    }
+
+    #[test]
     fn a_photon_after_a_dead_time_of_darkness_is_known() {
         let model = SpadModel::with_dead_time(Time::from_fs(100));
         let at = |time_fs| Photon::new(Time::from_fs(time_fs), 3, false);
         let run = |photons: &[Photon], wanted_from| {
             let from = Time::from_fs(1_000);
             let mut avalanches =
-                Avalanches::known_from(&model, [0; 2], 0, from, std::iter::empty());
+                Avalanches::known_from(&model, [0; 2], 0, &[], from, std::iter::empty());
             let (forever, wanted) = (Time::from_fs(i64::MAX), Time::from_fs(wanted_from));
             let mut edges = Vec::new();
             let known = avalanches.run(photons, None, forever, wanted, &mut edges);
@@ -336,14 +388,22 @@ mod tests {
     fn detected(model: &SpadModel, photons: &[SpadEvent]) -> (Vec<SpadEvent>, u64) {
         let photons: Vec<Photon> = photons.iter().map(|&event| event.into()).collect();
         let mut edges = Vec::new();
-        let lost = Avalanches::in_the_dark(model, [0; 2], 0).run_to_the_end(&photons, &mut edges);
+        let lost =
+            Avalanches::in_the_dark(model, [0; 2], 0, &[]).run_to_the_end(&photons, &mut edges);
         (edges, lost)
     }
 
     #[test]
     fn an_avalanche_at_the_very_end_of_a_pulse_makes_no_edge() {
         let mut events = vec![event(0, 3), event(10, 3), event(11, 3)];
-        assert_eq!(apply_dead_time(&mut events, Time::from_fs(10)), 1);
+        assert_eq!(
+            apply_dead_time(
+                &mut events,
+                &SpadModel::with_dead_time(Time::from_fs(10)),
+                0
+            ),
+            1
+        );
         assert_eq!(events, [event(0, 3), event(11, 3)]);
     }
 
@@ -362,7 +422,14 @@ mod tests {
     #[test]
     fn spads_do_not_blind_each_other() {
         let mut events = vec![event(5, 0), event(5, 1), event(6, 2)];
-        assert_eq!(apply_dead_time(&mut events, Time::from_ns(10)), 0);
+        assert_eq!(
+            apply_dead_time(
+                &mut events,
+                &SpadModel::with_dead_time(Time::from_ns(10)),
+                0
+            ),
+            0
+        );
         assert_eq!(events.len(), 3);
     }
 

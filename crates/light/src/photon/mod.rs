@@ -33,7 +33,9 @@ pub use pulse::{PulseError, PulseShape};
 pub use pulses::PixelPhotons;
 pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
-pub use spad::{AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SpadEvent, SpadModel};
+pub use spad::{
+    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, MOST_SPREAD, Photon, SpadEvent, SpadModel,
+};
 pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use stream::{
     Background, Draw, GROUP, Group, LightParts, ListedEchoes, NEVER_FS, OrderedEchoes, PER_BLOCK,

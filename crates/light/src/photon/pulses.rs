@@ -111,6 +111,7 @@ impl PhotonStream {
         mut pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
         let config = self.config();
+        let longest_dead_time = config.spads.longest_dead_time();
         let end = self.cycle_start(config.laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
@@ -129,7 +130,7 @@ impl PhotonStream {
             };
             // Whatever may blind a SPAD for an echo must find it.
             let may_begin =
-                |echo: u32| self.cycle_start(echo) + earliest <= until + config.spads.dead_time;
+                |echo: u32| self.cycle_start(echo) + earliest <= until + longest_dead_time;
             while next_echo < config.laser_cycles && may_begin(next_echo) {
                 echoes.add(next_echo);
                 for (light, listed) in parts.iter().zip(&mut listed) {

@@ -2,7 +2,7 @@
 //!
 //! The SPADs of a macropixel share its photons evenly. Each drives one wire of SPAD_RAW, which rises with
 //! an avalanche and stays high for the dead time. An avalanche exactly at the end of a pulse makes no edge, because the
-//! wire falls and rises in the same instant.
+//! wire falls and rises in the same instant. Where SPADs differ in dead time, all pulses are as wide as the shortest one.
 //!
 //! ```text
 //!   photon      ↓     ↓          ↓          ↓
@@ -17,7 +17,9 @@
 //! ([`Photon::breeds`]). What they trigger is drawn from their own time, SPAD and macropixel, so that code which
 //! starts from a known state sees the same.
 
-use super::random::Purpose;
+use smallvec::SmallVec;
+
+use super::random::{Purpose, normal, random_stream};
 use crate::photon::SpadGrid;
 use crate::units::Time;
 
@@ -29,6 +31,15 @@ const AFTERPULSE_REACHED: f64 = 0.999_664_537_372_097_5;
 
 /// SPADs that need no memory of their own. Made for 64 of them, the state of 16 took 2 % of a frame's time on the window engine.
 pub(super) const FEW_SPADS: usize = 16;
+
+/// Greatest spread of dead times: the shortest one is then a fifth of the mean.
+pub const MOST_SPREAD: f64 = 0.2;
+
+/// Standard deviations at which dead times are cut off.
+const SPREAD_REACH: f64 = 4.0;
+
+/// Random numbers of dead times have SPAD numbers with this bit: no array of a macropixel has as many.
+const DEAD_TIMES: u32 = 1 << 8;
 
 /// How long after an avalanche crosstalk fires a neighbour.
 pub const CROSSTALK_DELAY: Time = Time::from_ps(10);
@@ -89,8 +100,12 @@ pub enum DeadTimeLaw {
 pub struct SpadModel {
     /// The SPADs of a macropixel.
     pub grid: SpadGrid,
-    /// How long a SPAD stays blind after an avalanche.
+    /// How long a SPAD stays blind after an avalanche: the mean of the array.
     pub dead_time: Time,
+    /// Standard deviation of the SPADs' dead times, relative to the mean: 0 to [`MOST_SPREAD`].
+    pub dead_time_spread: f64,
+    /// Seed that decides which SPAD has which of them.
+    pub dead_time_seed: u32,
     /// What an avalanche during that time does.
     pub law: DeadTimeLaw,
     /// Probability that an avalanche has an afterpulse, 0 to 1.
@@ -110,6 +125,43 @@ impl SpadModel {
         }
     }
 
+    /// How long SPAD number `spad` of macropixel number `pixel` stays blind: a Gaussian number, cut off at [`SPREAD_REACH`] standard
+    /// deviations.
+    pub fn dead_time_of(&self, pixel: u32, spad: u8) -> Time {
+        if self.dead_time_spread == 0.0 {
+            return self.dead_time;
+        }
+        let place = DEAD_TIMES | u32::from(spad);
+        let seed = self.dead_time_seed.into();
+        let mut random = random_stream(seed, Purpose::SpadSpread, pixel, place);
+        self.dead_time_at(normal(&mut random).clamp(-SPREAD_REACH, SPREAD_REACH))
+    }
+
+    /// Those of all SPADs of a macropixel; none where all have the mean.
+    pub(super) fn dead_times(&self, pixel: u32) -> SmallVec<[Time; FEW_SPADS]> {
+        if self.dead_time_spread == 0.0 {
+            return SmallVec::new();
+        }
+        let spads = 0..self.grid.spads() as u8;
+        spads.map(|spad| self.dead_time_of(pixel, spad)).collect()
+    }
+
+    /// The dead time this many standard deviations above the mean.
+    fn dead_time_at(&self, deviations: f64) -> Time {
+        let factor = 1.0 + self.dead_time_spread * deviations;
+        Time::from_fs((self.dead_time.as_fs() as f64 * factor).round() as i64)
+    }
+
+    /// No SPAD has a shorter dead time. It is the width of all pulses.
+    pub fn shortest_dead_time(&self) -> Time {
+        self.dead_time_at(-SPREAD_REACH)
+    }
+
+    /// No SPAD has a longer one.
+    pub fn longest_dead_time(&self) -> Time {
+        self.dead_time_at(SPREAD_REACH)
+    }
+
     /// Whether avalanches cause others.
     pub fn has_secondaries(&self) -> bool {
         self.afterpulse_probability > 0.0 || self.crosstalk_probability > 0.0
@@ -125,7 +177,9 @@ impl SpadModel {
     pub fn reach(&self) -> Time {
         let mut reach = Time::ZERO;
         if self.afterpulse_probability > 0.0 {
-            reach = self.dead_time + self.afterpulse_time * AFTERPULSE_REACH + Time::from_fs(2);
+            reach = self.longest_dead_time()
+                + self.afterpulse_time * AFTERPULSE_REACH
+                + Time::from_fs(2);
         }
         if self.crosstalk_probability > 0.0 {
             reach = reach.max(CROSSTALK_DELAY);
@@ -133,12 +187,13 @@ impl SpadModel {
         reach
     }
 
-    /// The avalanches that the avalanche `parent` of macropixel `pixel` triggers, if it is one that does. `key` is
+    /// The avalanches that the avalanche `parent` of macropixel `pixel` triggers, if it is one that does, on a SPAD with this dead time. `key` is
     /// that of the photon stream.
     pub(super) fn children(
         &self,
         key: [u32; 2],
         pixel: u32,
+        dead_time: Time,
         parent: SpadEvent,
     ) -> impl Iterator<Item = SpadEvent> {
         let time_fs = parent.time.as_fs() as u64;
@@ -154,7 +209,7 @@ impl SpadModel {
             let share = AFTERPULSE_REACHED * rand_philox::u32_to_unit_f64(words[1]);
             let delay_fs = -libm::log1p(-share) * self.afterpulse_time.as_fs() as f64;
             SpadEvent::new(
-                parent.time + self.dead_time + Time::from_fs(1 + delay_fs.round() as i64),
+                parent.time + dead_time + Time::from_fs(1 + delay_fs.round() as i64),
                 parent.spad,
             )
         });
@@ -181,10 +236,35 @@ mod tests {
         let since = |parent: SpadEvent, child: SpadEvent| (child.time - parent.time, child.spad);
         parents
             .map(|parent| {
-                let children = model.children([1, 2], 3, parent);
+                let children = model.children([1, 2], 3, model.dead_time, parent);
                 children.map(|child| since(parent, child)).collect()
             })
             .collect()
+    }
+
+    #[test]
+    fn dead_times_have_their_spread() {
+        let model = SpadModel {
+            dead_time_spread: 0.1,
+            dead_time_seed: 3,
+            ..SpadModel::with_dead_time(Time::from_ns(8))
+        };
+        let spads = (0..1000).flat_map(|pixel| (0..16).map(move |spad| (pixel, spad)));
+        let own = spads.map(|(pixel, spad)| model.dead_time_of(pixel, spad).as_ns());
+        let own: Vec<f64> = own.collect();
+        let (least, most) = (model.shortest_dead_time(), model.longest_dead_time());
+        assert_eq!([least, most], [4.8, 11.2].map(|ns| Time::from_s(ns * 1e-9)));
+        assert!(own.iter().all(|ns| (4.8..=11.2).contains(ns)));
+        let n = own.len() as f64;
+        let mean = own.iter().sum::<f64>() / n;
+        let variance = own.iter().map(|ns| (ns - 8.0).powi(2)).sum::<f64>() / n;
+        assert!((mean - 8.0).abs() < 5.0 * 0.8 / n.sqrt(), "{mean}");
+        assert!((variance.sqrt() - 0.8).abs() < 5.0 * 0.8 / (2.0 * n).sqrt());
+        let other = SpadModel {
+            dead_time_seed: 4,
+            ..model
+        };
+        assert_ne!(model.dead_time_of(5, 6), other.dead_time_of(5, 6));
     }
 
     #[test]

@@ -294,16 +294,16 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
 /// Margins of flip-flops with clocks of their own.
 fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
     let local = LocalClocks::of(config, silicon);
-    let dead_time = config.dead_time();
+    let width = config.pulse_width();
     let mut margins = tightest(
         "SPAD_RAW",
         "SPAD_RAW",
         &local.netlist,
         local.toggles.iter(),
-        |r| local.toggle_slack(r, dead_time),
+        |r| local.toggle_slack(r, width),
     );
     let pulses = ChipTiming::measure(config, silicon).pulses;
-    let fault = pulses.follow(config.dead_time_ns).err();
+    let fault = pulses.follow(config).err();
     for margin in margins
         .iter_mut()
         .filter(|margin| margin.slack < Time::ZERO)
@@ -376,7 +376,7 @@ fn later_windows(config: &SensorConfig, pixel: &MacropixelTiming, aim: Aim) -> O
 
 /// Whether photons can cancel in a front end that CLK samples.
 fn cancelling_photons(config: &SensorConfig) -> Option<String> {
-    let (period, dead_time) = (config.clock().period(), config.dead_time());
+    let (period, dead_time) = (config.clock().period(), config.pulse_width());
     (config.tdc.has_clk_bins() && dead_time <= period).then(|| {
         format!(
             "two photons of a SPAD within a CLK period ({period}) cancel, as the dead time ({dead_time}) lets them"

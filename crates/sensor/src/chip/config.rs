@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::blocks::metdc_delay_line::Elements;
 use super::own_block::block::OwnBlock;
 use crate::netlist::{Conditions, Corner};
-use crate::photon::{MOST_SPADS, SpadGrid, count_bits};
+use crate::photon::{DeadTimeLaw, MOST_SPADS, MOST_SPREAD, SpadGrid, SpadModel, count_bits};
 use crate::settings::Range::{Above, OneOf, Within};
 use crate::settings::{keys, words};
 use crate::units::{BOLTZMANN_EV_PER_K, Frequency, Time, ZERO_CELSIUS_K};
@@ -176,6 +176,13 @@ keys! {
         ///
         /// No shorter than the front end follows, and longer than a CLK period if no photons are to cancel.
         dead_time_ns: f64 ["ns"] = 8.0, in Above(0.0, 1e6);
+        /// Standard deviation of the SPADs' dead times over the array, relative to their mean; each is Gaussian, cut off at four of them.
+        ///
+        /// SPAD_RAW pulses are as wide as the shortest dead time. For the engines window, gate and cycle.
+        dead_time_spread: f64 = 0.0, in Within(0.0, MOST_SPREAD),
+            from "none in the thesis";
+        /// Seed that decides which SPAD has which dead time.
+        dead_time_seed: u32 = 1, in Within(0.0, 4_294_967_295.0);
         /// Whether a photon during the dead time restarts it.
         paralysable: bool = false;
         /// Probability that an avalanche has an afterpulse.
@@ -288,9 +295,33 @@ impl SensorConfig {
         Time::from_s(self.stop_phase_ps * 1e-12)
     }
 
-    /// SPAD dead time.
+    /// SPAD dead time, the mean of the array.
     pub fn dead_time(&self) -> Time {
         Time::from_s(self.dead_time_ns * 1e-9)
+    }
+
+    /// Width of SPAD_RAW pulses: the shortest dead time of the array.
+    pub fn pulse_width(&self) -> Time {
+        self.spad_model().shortest_dead_time()
+    }
+
+    /// How the SPADs answer to photons. The configuration must have passed [`SensorConfig::check`].
+    pub fn spad_model(&self) -> SpadModel {
+        let (afterpulse_probability, afterpulse_time_s) = self.afterpulses();
+        SpadModel {
+            grid: self.spad_grid(),
+            dead_time: self.dead_time(),
+            dead_time_spread: self.dead_time_spread,
+            dead_time_seed: self.dead_time_seed,
+            law: if self.paralysable {
+                DeadTimeLaw::Paralysable
+            } else {
+                DeadTimeLaw::NonParalysable
+            },
+            afterpulse_probability,
+            afterpulse_time: Time::from_s(afterpulse_time_s),
+            crosstalk_probability: self.crosstalk_probability,
+        }
     }
 
     /// Largest start value, 2ⁿ − 1.

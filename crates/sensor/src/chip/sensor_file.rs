@@ -382,7 +382,7 @@ impl SensorConfig {
             key: "temperature_c",
             why: why.to_string(),
         })?;
-        ChipTiming::of(self).pulses.follow(self.dead_time_ns)?;
+        ChipTiming::of(self).pulses.follow(self)?;
         let half_period_ps = 0.5e12 / self.clk_hz;
         if self.stop_phase_ps.is_nan() || self.stop_phase_ps.abs() > half_period_ps {
             return Err(SensorFault::StopPhase {

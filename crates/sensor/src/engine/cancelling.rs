@@ -74,7 +74,7 @@ pub fn cancelled<R: Replay + ?Sized>(
     config: &SensorConfig,
     pixels: &[PulsedPixel<'_>],
 ) -> u64 {
-    let cancelling = Cancelling::of(config.dead_time(), config.clock(), || engine.law());
+    let cancelling = Cancelling::of(config.pulse_width(), config.clock(), || engine.law());
     let Some(cancelling) = cancelling else {
         return 0;
     };

@@ -149,7 +149,7 @@ pub enum NotModelled {
     /// A laser pulse that is not Gaussian as it is detected.
     #[error("a measured laser pulse, or late avalanches of a diffusion tail")]
     MeasuredPulse,
-    /// SPADs with a detection efficiency or dark count rate of their own.
+    /// SPADs with a detection efficiency, dark count rate or dead time of their own.
     #[error("SPADs that differ")]
     SpadsThatDiffer,
     /// Bins that count several photons of a laser cycle.
@@ -226,7 +226,7 @@ pub(super) fn follows(sensor: &Sensor, limits: &PulseLimits) -> Result<(), Engin
     if sensor.silicon().mismatch.is_some() {
         return Err(EngineError::Mismatch);
     }
-    let followed = limits.follow(sensor.dead_time_ns);
+    let followed = limits.follow(sensor);
     followed.map_err(EngineError::FrontEnd)
 }
 

@@ -12,9 +12,7 @@ use super::{
     Cancelling, Engine, EngineError, Expose, Exposed, LitPixel, PulsedPixel, Replay, Work,
 };
 use crate::chip::{Exposure, Sensor, WindowLaw};
-use crate::photon::{
-    DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
-};
+use crate::photon::{PhotonStream, PixelLight, PixelPhotons, SpadEvent, StreamConfig};
 use crate::units::Time;
 
 /// The stream of light for a sensor in an exposure, with its slots where the sensor's bins are. `pulse_sigma` is that of
@@ -26,7 +24,6 @@ pub fn stream_config(
     pulse_sigma: Time,
 ) -> StreamConfig {
     let sensor = sensor.into();
-    let (afterpulse_probability, afterpulse_time_s) = sensor.afterpulses();
     StreamConfig {
         seed,
         clock: exposure.clock,
@@ -36,17 +33,7 @@ pub fn stream_config(
         pulse_sigma,
         pulse_shape: None,
         energy_spread: 0.0,
-        spads: SpadModel {
-            grid: sensor.spad_grid(),
-            dead_time: sensor.dead_time(),
-            law: match sensor.paralysable {
-                false => DeadTimeLaw::NonParalysable,
-                true => DeadTimeLaw::Paralysable,
-            },
-            afterpulse_probability,
-            afterpulse_time: Time::from_s(afterpulse_time_s),
-            crosstalk_probability: sensor.crosstalk_probability,
-        },
+        spads: sensor.spad_model(),
     }
 }
 
@@ -256,7 +243,9 @@ fn whole_pixels<E: Replay + ?Sized>(
         .collect();
     let histograms = engine.replay(&pulsed)?;
     let config = stream.config();
-    let cancelling = Cancelling::of(config.spads.dead_time, config.clock, || engine.law());
+    let cancelling = Cancelling::of(config.spads.shortest_dead_time(), config.clock, || {
+        engine.law()
+    });
     let cancelled = cancelling.map_or(0, |cancelling| {
         let seen = |pixel: &PulsedPixel<'_>| {
             let pulses = engine.as_the_law_sees(pixel.number, pixel.pulses);

@@ -110,7 +110,7 @@ impl LaneSimulation {
                 bit += 1;
             }
         }
-        let (origin, dead_time) = (self.schedule().origin, self.sensor.dead_time());
+        let (origin, width) = (self.schedule().origin, self.sensor.pulse_width());
         for &(lane, pulse) in &self.pulses {
             let net = pins.spad_raw[usize::from(pulse.spad)];
             let time = origin + pulse.time;
@@ -123,7 +123,7 @@ impl LaneSimulation {
                 values: rise,
             });
             drives.push(LaneDrive {
-                time: time + dead_time,
+                time: time + width,
                 net,
                 mask,
                 values: fall,

@@ -55,7 +55,7 @@ pub fn late_cycle(
     match counted_before(sensor, exposure, pixel, first_cycle) {
         None => whole,
         Some(counted) => {
-            let busy = sensor.dead_time() + sensor.longest_delay_line() + sensor.clk_skew(at.1);
+            let busy = sensor.pulse_width() + sensor.longest_delay_line() + sensor.clk_skew(at.1);
             let busy = busy.as_fs() / exposure.clock.period().as_fs() + 1;
             let skip = Skip {
                 first_cycle,

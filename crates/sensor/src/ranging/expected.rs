@@ -12,7 +12,7 @@
 //!
 //! How a SPAD goes through a laser cycle is [`spad_state`](super::spad_state)'s.
 //!
-//! Assumed: SPADs alike, and recovered from the echo before the next laser cycle's.
+//! Assumed: SPADs alike ([`dead_times`](super::dead_times) says what it costs where they are not), and recovered from the echo before the next laser cycle's.
 
 use std::sync::LazyLock;
 
@@ -80,6 +80,8 @@ pub struct Response {
     tail: Option<Tail>,
     pub(super) counting: Counting,
     dead: Dead,
+    /// Standard deviation of dead times, relative to their mean.
+    pub(super) dead_time_spread: f64,
 }
 
 impl Response {
@@ -110,6 +112,7 @@ impl Response {
                 afterpulse_bins: (afterpulse_s / bin_s).max(1e-9),
                 crosstalk: config.crosstalk_probability * neighbours,
             },
+            dead_time_spread: config.dead_time_spread,
         }
     }
 
@@ -125,6 +128,12 @@ impl Response {
         other.counting.event_type = EventType::Greater;
         other.counting.threshold = threshold;
         Some(other)
+    }
+
+    /// The same SPADs, blind for so many times as long.
+    pub(super) fn with_dead_times(mut self, factor: f64) -> Self {
+        self.dead.time_bins *= factor;
+        self
     }
 
     /// Dead time, bins.

@@ -361,15 +361,16 @@ impl EchoFinder {
         !is_inside || ends_high != [false; 2]
     }
 
-    /// What is said of an echo's place: the least that its counts allow, and what its unknown shape adds.
+    /// What is said of an echo's place: the least that its counts allow, and what its unknown shape and unequal dead times add.
     fn bound_bins(&self, corrected: &Corrected) -> f64 {
         let of_shape = OF_SHAPE * self.spread_bins(&corrected.light).unwrap_or(0.0);
         let bound = libm::hypot(corrected.bound_bins, of_shape);
+        let Some(Ok(walk)) = self.walk else {
+            return bound;
+        };
+        let of_dead_times = walk.error_of_dead_times(&corrected.light);
         // Under a THRESHOLD other lights may explain the counts from anywhere.
-        match self.walk {
-            Some(Ok(walk)) => bound.min(walk.response.bins as f64),
-            _ => bound,
-        }
+        libm::hypot(bound, of_dead_times).min(walk.response.bins as f64)
     }
 
     /// Whether an echo is so strong that its counts do not tell its place.

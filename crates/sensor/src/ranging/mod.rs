@@ -3,6 +3,7 @@
 mod arrival;
 mod calibration;
 mod counting;
+mod dead_times;
 mod expected;
 mod finder;
 mod likelihood;

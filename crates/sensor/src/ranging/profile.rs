@@ -50,10 +50,12 @@ pub struct OtherSensor {
 }
 
 /// Keys on which bins do not depend.
-const FREE: [&str; 14] = [
+const FREE: [&str; 16] = [
     "bin_bits",
     "overflow",
     "dead_time_ns",
+    "dead_time_spread",
+    "dead_time_seed",
     "paralysable",
     "afterpulse_probability",
     "afterpulse_time_ns",

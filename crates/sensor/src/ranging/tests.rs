@@ -10,6 +10,7 @@ use crate::engine::{LitPixel, Window, expose, stream_config};
 use crate::photon::{DiffusionTail, EchoWidth, PhotonStream, PixelLight, PulseShape, StreamConfig};
 use crate::units::{Time, TimeOfFlight};
 
+mod dead_times;
 mod short_pulses;
 
 const PULSE_SIGMA: Time = Time::from_ps(1_911);

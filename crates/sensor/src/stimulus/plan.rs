@@ -217,7 +217,7 @@ impl StimulusPlan {
     pub(crate) fn skipping(self, skip: Skip) -> Option<(Self, Time)> {
         let resumes = self.exposure.falling(skip.first_edge(&self.exposure));
         let rest = resumes - self.exposure.clock.period();
-        let settled = self.sensor.dead_time() + SETTLING;
+        let settled = self.sensor.pulse_width() + SETTLING;
         (rest > settled).then(|| {
             let rest = self.schedule.origin + rest;
             let skip = Some(skip);
@@ -333,7 +333,7 @@ impl StimulusPlan {
     }
 
     fn spads<'p>(&'p self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<'p> {
-        let (origin, dead_time) = (self.schedule.origin, self.sensor.dead_time());
+        let (origin, width) = (self.schedule.origin, self.sensor.pulse_width());
         let (nets, spads) = (pins.spad_raw.clone(), self.sensor.spads());
         let end = self.schedule.counted;
         let net =
@@ -362,7 +362,7 @@ impl StimulusPlan {
                 .map(move |pulse| Drive::new(origin + pulse.1.time + offset, net(pulse), value));
             boxed(odd.chain(drives.take_while(move |d| d.time <= end)))
         };
-        merge([edges(Time::ZERO, true), edges(dead_time, false)])
+        merge([edges(Time::ZERO, true), edges(width, false)])
     }
 }
 

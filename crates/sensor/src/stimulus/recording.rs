@@ -117,9 +117,10 @@ impl Recording {
 
     /// Sorts what was pushed, and drops what falls into dead times.
     fn settle(&mut self, config: &SensorConfig) {
-        for pulses in &mut self.pulses {
+        let spads = config.spad_model();
+        for (pixel, pulses) in (0..).zip(&mut self.pulses) {
             pulses.sort_unstable();
-            self.lost_to_dead_time += apply_dead_time(pulses, config.dead_time());
+            self.lost_to_dead_time += apply_dead_time(pulses, &spads, pixel);
         }
     }
 }

@@ -181,8 +181,8 @@ impl StreamConfig {
     pub fn most_edges(&self, light: &PixelLight) -> f64 {
         let causes = 1.0 + self.spads.afterpulse_probability + self.spads.crosstalk_probability;
         let photons = self.most_photons_per_cycle(light) * causes;
-        let dead_times =
-            self.spads.grid.spads() as f64 * (self.cycle_s() / self.spads.dead_time.as_s() + 1.0);
+        let dead_times = self.spads.grid.spads() as f64
+            * (self.cycle_s() / self.spads.shortest_dead_time().as_s() + 1.0);
         photons.min(dead_times) * f64::from(self.laser_cycles)
     }
 

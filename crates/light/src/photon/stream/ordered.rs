@@ -198,9 +198,15 @@ impl OrderedEchoes<'_> {
         (time < self.end).then_some(photon)
     }
 
-    /// Takes notice that a SPAD is blind `from` a time, or was known to be until then, `until` another one. Returns until when
-    /// it is blind with the photons that come meanwhile.
-    pub(in crate::photon) fn blind(&mut self, spad: u8, from: Time, until: Time) -> Time {
+    /// Takes notice that a SPAD with this dead time is blind `from` a time, or was known to be until then, `until` another one. Returns
+    /// until when it is blind with the photons that come meanwhile.
+    pub(in crate::photon) fn blind(
+        &mut self,
+        spad: u8,
+        dead_time: Time,
+        from: Time,
+        until: Time,
+    ) -> Time {
         let (spad, pixel) = (usize::from(spad), self.pixel);
         let model = &pixel.stream.config.spads;
         let (mut from, mut until) = (from, until);
@@ -227,7 +233,7 @@ impl OrderedEchoes<'_> {
                 }
                 return until;
             };
-            (from, until) = (until, last + model.dead_time);
+            (from, until) = (until, last + dead_time);
         }
     }
 }

@@ -19,7 +19,7 @@ use crate::photon::light::{Layer, PixelLight};
 use crate::photon::pulse::PulseSampler;
 use crate::photon::quantile::{NORMAL_BITS, NormalSampler};
 use crate::photon::random::{Purpose, layer_key};
-use crate::photon::spad::{Photon, SpadEvent};
+use crate::photon::spad::{FEW_SPADS, Photon, SpadEvent};
 use crate::units::Time;
 
 /// Adding it to numbers up to ±2⁵¹ leaves no fraction, and the number in the low bits.
@@ -42,6 +42,8 @@ pub struct PixelStream<'a> {
     /// Of the layer.
     pub(super) key: [u32; 2],
     pub(in crate::photon) pixel: u32,
+    /// Of its SPADs, where they differ.
+    pub(in crate::photon) dead_times: SmallVec<[Time; FEW_SPADS]>,
     pub(super) kind: Kind,
     /// All parts of a macropixel's light are, or none is.
     pub is_bright: bool,
@@ -156,6 +158,7 @@ impl PhotonStream {
             stream: self,
             key: self.key,
             pixel,
+            dead_times: self.config.spads.dead_times(pixel),
             kind,
             is_bright: false,
             is_alone: true,
@@ -211,7 +214,9 @@ impl PixelStream<'_> {
     pub fn children(&self, photon: Photon) -> impl Iterator<Item = SpadEvent> {
         let parent = SpadEvent::new(photon.time, photon.spad);
         let spads = &self.stream.config.spads;
-        spads.children(self.stream.key, self.pixel, parent)
+        let own = self.dead_times.get(usize::from(photon.spad));
+        let dead_time = own.copied().unwrap_or(spads.dead_time);
+        spads.children(self.stream.key, self.pixel, dead_time, parent)
     }
 
     /// Earliest time of a photon of the echo and later than the last one, fs after the start of its cycle; both 0 where there

@@ -108,7 +108,10 @@ impl Cohort {
                 stream.pulse_shape.is_some() || has_shape,
                 NotModelled::MeasuredPulse,
             ),
-            (light.spads().is_some(), NotModelled::SpadsThatDiffer),
+            (
+                light.spads().is_some() || spads.dead_time_spread > 0.0,
+                NotModelled::SpadsThatDiffer,
+            ),
             (light.has_trains(), NotModelled::OtherLasers),
             (self.sensor.tdc == Tdc::Counter, NotModelled::CounterTdc),
         ];

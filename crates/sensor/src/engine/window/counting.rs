@@ -259,6 +259,11 @@ impl<'a> Counting<'a> {
             self.count_bright(&mut pixel);
             return (pixel.hits, pixel.work);
         }
+        if self.stream.config().spads.dead_time_spread > 0.0 {
+            // The other methods take one dead time.
+            self.count_layers(&mut pixel);
+            return (pixel.hits, pixel.work);
+        }
         if !has_clk_bins {
             match self.can_sort(&pixel) {
                 true => self.count_sorted(&mut pixel),

@@ -60,7 +60,9 @@ impl Window {
         window: &OpenWindow,
     ) -> (Vec<i64>, Work) {
         let config = stream.config();
-        let cancelling = Cancelling::of(config.spads.dead_time, config.clock, || self.law.clone());
+        let cancelling = Cancelling::of(config.spads.shortest_dead_time(), config.clock, || {
+            self.law.clone()
+        });
         let mut hits = self.law.empty_hits(window);
         let mut work = Work::default();
         let mut cancelled = 0;

@@ -172,7 +172,7 @@ impl Sight {
             return None;
         }
         let spads = &stream.config().spads;
-        let from_fs = first_fs - spads.dead_time.as_fs() - ROUNDING_FS;
+        let from_fs = first_fs - spads.longest_dead_time().as_fs() - ROUNDING_FS;
         let until_fs = end_fs + ROUNDING_FS;
         let plain = Spans::new(stream, from_fs, until_fs)?;
         let breeding_from_fs = plain.from_fs - spads.reach().as_fs() - 2 * ROUNDING_FS;

@@ -17,7 +17,8 @@ impl Counting<'_> {
         let (config, light, sight) = (self.stream.config(), pixel.light, pixel.sight);
         let is_paralysable = config.spads.law == DeadTimeLaw::Paralysable;
         let last_cycle = config.laser_cycles.checked_sub(1)?;
-        let is_packed = self.stream.spads() == SPADS && light.is_alone;
+        let is_alike = config.spads.dead_time_spread == 0.0;
+        let is_packed = self.stream.spads() == SPADS && light.is_alone && is_alike;
         if !is_packed || light.has_listed_echo() {
             return None;
         }
