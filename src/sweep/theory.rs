@@ -253,7 +253,10 @@ impl Wall {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_philox::Philox;
+
     use crate::chip::{hslidar, hslidar_delay_line};
+    use crate::photon::{Purpose, normal, random_stream};
     use crate::settings::Settings;
 
     #[test]
@@ -387,5 +390,83 @@ mod tests {
         assert_eq!(of(2.0, 1.01 * reach_m, "p_right"), Some(0.0));
         // Too far away for a precision: empty, not 1.7e199.
         assert_eq!(of(2.0, 1e5, "precision_bound_m"), None);
+    }
+
+    fn uniform(random: &mut Philox) -> f64 {
+        f64::from(random.next_u32()) * 2f64.powi(-32)
+    }
+
+    /// A number of photons, by multiplication of uniform numbers.
+    fn photons(mean: f64, random: &mut Philox) -> u32 {
+        let (mut left, mut photons) = (uniform(random), 0);
+        while left > libm::exp(-mean) {
+            left *= uniform(random);
+            photons += 1;
+        }
+        photons
+    }
+
+    /// Each photon has a place in the pulse, and its avalanche and the trigger have a delay of their own.
+    #[test]
+    fn photons_that_are_late_one_by_one_are_found_as_often_as_theory_says() {
+        const TO_SIGMA: f64 = 0.424_660_900_144_009_5;
+        let mut scene = Scene::outdoor();
+        scene.lidar.pulse_fwhm_ns = 1.0;
+        scene.lidar.spad_jitter_fwhm_ps = 3000.0;
+        scene.lidar.trigger_jitter_ps = 1500.0;
+        let asked = Asked {
+            range_m: 150.0,
+            reflectivity: 0.1,
+            illuminance_klux: Some(50.0),
+            laser_cycles: 100,
+            ..Asked::default()
+        };
+        let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
+        let results = wall.results(&mut Last::default());
+        let of = |name: &str| {
+            let at = columns().iter().position(|c| c.name == name).unwrap();
+            results[at].number().unwrap()
+        };
+        let (signal, background) = (of("signal_per_cycle"), of("background_per_bin_cycle"));
+        let bin_ns = 1e9 * wall.rig.bin_s;
+        let widths_ns = [1.0 * TO_SIGMA, 3.0 * TO_SIGMA, 1.5];
+        let fwhm_ns = widths_ns.map(|ns| ns * ns).iter().sum::<f64>().sqrt() / TO_SIGMA;
+        let within = (0.5 * fwhm_ns / bin_ns).max(1.0);
+        let mut random = random_stream(5, Purpose::Photons, 0, 0);
+        let mut right = 0;
+        let trials = 3000;
+        for _ in 0..trials {
+            let at = 8.0 + uniform(&mut random);
+            let mut counts = [0; 16];
+            for _ in 0..wall.laser_cycles {
+                let mut hits = [false; 16];
+                for hit in &mut hits {
+                    *hit = photons(background, &mut random) > 0;
+                }
+                let trigger_ns = widths_ns[2] * normal(&mut random);
+                for _ in 0..photons(signal, &mut random) {
+                    let late_ns =
+                        widths_ns[0] * normal(&mut random) + widths_ns[1] * normal(&mut random);
+                    let place = at + (trigger_ns + late_ns) / bin_ns;
+                    if (0.0..16.0).contains(&place) {
+                        hits[place as usize] = true;
+                    }
+                }
+                for (count, hit) in counts.iter_mut().zip(hits) {
+                    *count += i32::from(hit);
+                }
+            }
+            let most = *counts.iter().max().expect("16 bins");
+            let tied: Vec<usize> = (0..16).filter(|&bin| counts[bin] == most).collect();
+            let winner = tied[random.next_u32() as usize % tied.len()];
+            right += u32::from((winner as f64 + 0.5 - at).abs() <= within);
+        }
+        let (share, expected) = (f64::from(right) / f64::from(trials), of("p_detection"));
+        let deviation = (expected * (1.0 - expected) / f64::from(trials)).sqrt();
+        assert!((0.3..0.95).contains(&expected), "{expected} tells little");
+        assert!(
+            (share - expected).abs() < 4.0 * deviation + 0.005,
+            "{share} {expected}"
+        );
     }
 }
