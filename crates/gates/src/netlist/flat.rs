@@ -19,16 +19,19 @@ impl NetId {
     pub const NONE: NetId = NetId(u32::MAX);
 
     /// From an index.
+    #[inline]
     pub const fn new(index: usize) -> Self {
         NetId(index as u32)
     }
 
     /// Index into per-net arrays.
+    #[inline]
     pub const fn index(self) -> usize {
         self.0 as usize
     }
 
     /// Whether this is a net at all.
+    #[inline]
     pub const fn is_some(self) -> bool {
         self.0 != u32::MAX
     }

@@ -53,7 +53,6 @@ impl<W: Read + Write + Seek> FstWriter<W> {
             full: body.size() + BLOCK,
             body,
             ids: header.ids,
-            values: Vec::new(),
             start: Time::ZERO,
             stamped: Time::ZERO,
             error: None,
@@ -66,8 +65,6 @@ impl<W: Read + Write + Seek> FstWriter<W> {
 pub struct Fst<W: Write + Seek> {
     body: FstBodyWriter<W>,
     ids: Vec<FstSignalId>,
-    /// Values of one bus.
-    values: Vec<u8>,
     /// Size of `body` at which its block is complete.
     full: usize,
     start: Time,
@@ -146,11 +143,9 @@ impl<W: Read + Write + Seek> Format for Fst<W> {
     }
 
     #[inline]
-    fn bus(&mut self, variable: u32, values: impl ExactSizeIterator<Item = u8>) {
-        self.values.clear();
-        self.values.extend(values);
+    fn bus(&mut self, variable: u32, values: &[u8]) {
         let id = self.ids[variable as usize];
-        let changed = self.body.signal_change(id, &self.values);
+        let changed = self.body.signal_change(id, values);
         self.keep_error(changed);
     }
 
