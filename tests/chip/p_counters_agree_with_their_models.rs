@@ -66,13 +66,13 @@ fn behind_the_last_flip_flop(bench: &Bench) -> Time {
     let (mut net, mut behind) = (bench.net("LOCAL_STOP"), Time::ZERO);
     loop {
         let mut cells = bench.netlist.cells().iter();
-        let driver = cells.find(|cell| cell.outputs.contains(&net));
+        let driver = cells.find(|cell| cell.outputs.contains(&Some(net)));
         let driver = driver.expect("LOCAL_STOP has a driver");
         if driver.kind.is_flip_flop() {
             return behind;
         }
         behind += bench.delay(driver.kind, 0, One);
-        net = driver.inputs[0];
+        net = driver.input(0);
     }
 }
 

@@ -271,8 +271,7 @@ fn the_readout_causes_no_event_while_nothing_is_read() {
     for (index, scope) in netlist.scopes().iter().enumerate() {
         if is_readout(&scope.name) {
             for cell in netlist.cells_of(index) {
-                let outputs = netlist.cells()[cell].outputs;
-                for net in outputs.iter().filter(|net| net.is_some()) {
+                for net in netlist.cells()[cell].output_nets() {
                     nets[net.index()] = true;
                 }
             }

@@ -99,7 +99,7 @@ mod tests {
         for bit in 0..bits {
             let name = |what: &str| format!("{what}_{bit}");
             let inputs = [init[bit], load, memory_reset];
-            let outputs = [memory[bit], crate::netlist::Net::NONE];
+            let outputs = [Some(memory[bit]), None];
             m.cell(&name("memory"), Dffr, &inputs, &outputs);
             let next = carry.map_or(qn[bit], |carry| m.gate(Xor2, &[q[bit], carry]));
             carry = Some(carry.map_or(q[bit], |carry| m.gate(And2, &[q[bit], carry])));
@@ -130,7 +130,7 @@ mod tests {
             let not = m.gate(Inv, &[all]);
             hit = m.gate(And2, &[hit, not]);
         }
-        let outputs = [local_stop, crate::netlist::Net::NONE];
+        let outputs = [Some(local_stop), None];
         m.cell("stop", Dffr, &[hit, clk, reset], &outputs);
         let text = format!("{has_memory} {late}");
         SensorConfig {

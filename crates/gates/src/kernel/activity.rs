@@ -234,7 +234,10 @@ mod tests {
         let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
         assert_eq!(run(&timing), ((20, [0, 0]), (20, [20, 0])));
         // The gate slower than the chain.
-        let nand = netlist.cells().iter().position(|cell| cell.outputs[0] == z);
+        let nand = netlist
+            .cells()
+            .iter()
+            .position(|cell| cell.outputs[0] == Some(z));
         let slow = ArcDelay {
             rise_fs: 500_000,
             fall_fs: 500_000,

@@ -123,7 +123,7 @@ impl LaneKernel {
             groups: NONE,
         };
         let (delays, places) = DelaySet::all(netlist, timing);
-        let index = |n: NetId| if n.is_some() { n.index() as u32 } else { NONE };
+        let index = |n: Option<NetId>| n.map_or(NONE, |n| n.index() as u32);
         let cells = netlist
             .cells()
             .iter()

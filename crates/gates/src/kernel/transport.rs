@@ -100,8 +100,7 @@ pub(super) fn transport_nets(netlist: &Netlist, timing: &Timing) -> impl Iterato
     let cells = netlist.cells().iter().enumerate();
     cells
         .filter(|(index, _)| timing.model(*index) == DelayModel::Transport)
-        .flat_map(|(_, cell)| cell.outputs)
-        .filter(|net| net.is_some())
+        .flat_map(|(_, cell)| cell.output_nets())
         .map(|net| net.index())
 }
 

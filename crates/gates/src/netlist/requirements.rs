@@ -130,7 +130,8 @@ impl<'n> Requirements<'n> {
     fn add(&mut self, cell: usize, kind: CellKind, library: &Library, corner: Corner) {
         let limits = library.checks(kind);
         let limit = |check, edge| Time::from_fs(limits.toward(check, edge, corner).into());
-        let [data, clock, ..] = self.netlist.cells()[cell].inputs;
+        let leaf = &self.netlist.cells()[cell];
+        let (data, clock) = (leaf.input(0), leaf.input(1));
         for launch in Edge::BOTH {
             for capture in Edge::BOTH {
                 let same = launch == capture;
@@ -193,7 +194,8 @@ impl<'n> Requirements<'n> {
 
     /// The paths that a requirement is about: of the data (or the pulse's begin), and of the clock (or its end).
     pub fn paths(&self, requirement: &Requirement) -> Option<(Path, Path)> {
-        let [data, clock, ..] = self.netlist.cells()[requirement.cell].inputs;
+        let leaf = &self.netlist.cells()[requirement.cell];
+        let (data, clock) = (leaf.input(0), leaf.input(1));
         let path =
             |after: Edge, net, edge, bound| self.arrivals[after as usize].path(net, edge, bound);
         let (launch, capture) = (requirement.launch, requirement.capture);
@@ -219,21 +221,26 @@ impl<'n> Requirements<'n> {
 mod tests {
     use super::*;
     use crate::logic::Logic;
-    use crate::netlist::{ModuleBuilder, Net, Timing};
+    use crate::netlist::{ModuleBuilder, Timing};
 
     /// A flip-flop behind an inverter, captured by the same clock or by its inverse.
     fn pair(inverted: bool) -> Netlist {
         let mut m = ModuleBuilder::new("pair");
         let (d, ck, r) = (m.input("D"), m.input("CK"), m.input("R"));
         let (q, z) = (m.wire("Q"), m.output("Z"));
-        m.cell("first", CellKind::Dffr, &[d, ck, r], &[q, Net::NONE]);
+        m.cell("first", CellKind::Dffr, &[d, ck, r], &[Some(q), None]);
         let data = m.gate(CellKind::Inv, &[q]);
         let clock = if inverted {
             m.gate(CellKind::Inv, &[ck])
         } else {
             ck
         };
-        m.cell("second", CellKind::Dffr, &[data, clock, r], &[z, Net::NONE]);
+        m.cell(
+            "second",
+            CellKind::Dffr,
+            &[data, clock, r],
+            &[Some(z), None],
+        );
         Netlist::elaborate(&m.finish().unwrap())
     }
 

@@ -107,7 +107,7 @@ impl<'n> StaticTiming<'n> {
         let pins = || {
             let cells = (0u32..).zip(netlist.cells());
             cells.flat_map(|(index, cell)| {
-                triggers(cell).map(move |pin| (cell.inputs[pin].index(), (index, pin as u8)))
+                triggers(cell).map(move |pin| (cell.input(pin).index(), (index, pin as u8)))
             })
         };
         let mut first_load = vec![0; netlist.net_count() + 1];
@@ -138,8 +138,8 @@ impl<'n> StaticTiming<'n> {
             let leaf = &self.netlist.cells()[cell];
             let outputs = leaf.outputs.iter().enumerate();
             outputs
-                .filter(|(_, net)| net.is_some())
-                .flat_map(move |(output, &net)| {
+                .filter_map(|(output, net)| Some((output, (*net)?)))
+                .flat_map(move |(output, net)| {
                     let edges = caused(leaf.kind, pin, edge, output).iter();
                     edges.map(move |&edge| ArcTo {
                         to: node(net, edge),
@@ -216,7 +216,7 @@ impl<'n> StaticTiming<'n> {
                 let own = delays[pin][arc.output].to(level);
                 let leaf = &self.netlist.cells()[cell];
                 let quickest = (0..leaf.kind.inputs().len())
-                    .filter(|&other| leaf.kind.triggers(other) && can_change(leaf.inputs[other]))
+                    .filter(|&other| leaf.kind.triggers(other) && can_change(leaf.input(other)))
                     .map(|other| delays[other][arc.output].to(level))
                     .fold(own, u32::min);
                 let arrival = |time_fs| Arrival {
@@ -374,7 +374,7 @@ impl Path {
 mod tests {
     use super::*;
     use crate::logic::Logic;
-    use crate::netlist::{Corner, Library, ModuleBuilder, Net};
+    use crate::netlist::{Corner, Library, ModuleBuilder};
 
     #[test]
     fn rise_and_fall_alternate_through_inverters() {
@@ -389,7 +389,7 @@ mod tests {
         let analysis = StaticTiming::new(&netlist, &timing);
         let input = netlist.net("A").unwrap();
         let arrivals = analysis.arrivals(&[(input, Edge::Rise)], &[]).unwrap();
-        let end = netlist.cells()[3].outputs[0];
+        let end = netlist.cells()[3].outputs[0].unwrap();
         let delay = |to| library.delay(CellKind::Inv, 0, to, Corner::Typ);
         let sum = (delay(Logic::Zero) + delay(Logic::One)) * 2;
         assert_eq!(arrivals.edge_window(end, Edge::Rise), Some((sum, sum)));
@@ -419,7 +419,7 @@ mod tests {
         let mut m = ModuleBuilder::new("m");
         let (d, ck, r) = (m.input("D"), m.input("CK"), m.input("R"));
         let q = m.output("Q");
-        m.cell("ff", CellKind::Dffr, &[d, ck, r], &[q, Net::NONE]);
+        m.cell("ff", CellKind::Dffr, &[d, ck, r], &[Some(q), None]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);

@@ -542,7 +542,16 @@ $upscope $end
         let (mut stamp, mut block) = (Stamp::new(), Block::new());
         let mut fs = 0;
         let steps = [1, 7, 9_999, 10_001, 99_999_999, LOW as i64, 123_456_789_012];
-        let few = [0, 9, 10, 99_999_999, 100_000_000, 100_000_001, 1 << 53, i64::MAX];
+        let few = [
+            0,
+            9,
+            10,
+            99_999_999,
+            100_000_000,
+            100_000_001,
+            1 << 53,
+            i64::MAX,
+        ];
         let walk = (0..100_000).map(|i| {
             fs += steps[i * i % 7] * (i as i64 % 3);
             fs

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use femtogate::kernel::{Drive, Kernel, in_order};
 use femtogate::logic::Logic;
-use femtogate::netlist::{CellKind, Corner, Library, Module, ModuleBuilder, Net, Netlist, Timing};
+use femtogate::netlist::{CellKind, Corner, Library, Module, ModuleBuilder, Netlist, Timing};
 use femtogate::units::Time;
 use proptest::prelude::*;
 
@@ -24,11 +24,11 @@ fn register(stages: usize, watched: impl IntoIterator<Item = usize>) -> Arc<Modu
             &name,
             CellKind::Dffr,
             &[data, ck, r],
-            &[q[stage], Net::NONE],
+            &[Some(q[stage]), None],
         );
         let name = format!("copy_{stage}");
         let pins = [q[stage], other, r];
-        m.cell(&name, CellKind::Dffr, &pins, &[copies[stage], Net::NONE]);
+        m.cell(&name, CellKind::Dffr, &pins, &[Some(copies[stage]), None]);
     }
     for stage in watched {
         m.gate(CellKind::Inv, &[q[stage]]);

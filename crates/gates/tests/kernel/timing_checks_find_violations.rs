@@ -22,11 +22,10 @@ pub fn pair(kind: CellKind) -> Netlist {
     let mut m = ModuleBuilder::new("pair");
     let pins: Vec<_> = kind.inputs().iter().map(|pin| m.input(pin)).collect();
     let (q1, q2) = (m.output("Q1"), m.output("Q2"));
-    let unused = femtogate::netlist::Net::NONE;
-    m.cell("first", kind, &pins, &[q1, unused]);
+    m.cell("first", kind, &pins, &[Some(q1), None]);
     let mut second = pins;
     second[0] = q1;
-    m.cell("second", kind, &second, &[q2, unused]);
+    m.cell("second", kind, &second, &[Some(q2), None]);
     Netlist::elaborate(&m.finish().unwrap())
 }
 

@@ -37,12 +37,12 @@ fn events(trace: &Recorder, net: NetId) -> Vec<(i64, Logic, Logic)> {
 fn reference(
     trace: &Recorder,
     kind: CellKind,
-    inputs: &[NetId],
+    inputs: &[Option<NetId>],
     limits: &CheckLimits,
 ) -> Vec<(CheckKind, String, i64, i64)> {
     let pin = |name: &str| {
         let index = kind.inputs().iter().position(|pin| *pin == name).unwrap();
-        events(trace, inputs[index])
+        events(trace, inputs[index].unwrap())
     };
     let rises = |list: &[(i64, Logic, Logic)]| -> Vec<i64> {
         let up = list

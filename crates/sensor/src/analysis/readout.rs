@@ -77,7 +77,7 @@ impl ReadTiming {
             let limits = library.checks(cell.kind);
             Edge::BOTH.map(|edge| {
                 let setup = limits.toward(CheckKind::Setup, edge, silicon.corner);
-                let window = from_words.edge_window(cell.inputs[0], edge);
+                let window = from_words.edge_window(cell.input(0), edge);
                 window.map(|(_, last)| last + Time::from_fs(setup.into()))
             })
         });

@@ -149,7 +149,7 @@ impl Kernel {
 mod tests {
     use super::*;
     use crate::kernel::stimulus::{Drive, in_order};
-    use crate::netlist::{CellKind, Corner, Library, ModuleBuilder, Net, Netlist, Timing};
+    use crate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
 
     /// A register is a bank from the first edge at which all is known and at rest, until a reset comes.
     #[test]
@@ -164,7 +164,7 @@ mod tests {
                 &format!("stage_{stage}"),
                 CellKind::Dffr,
                 &pins,
-                &[q[stage], Net::NONE],
+                &[Some(q[stage]), None],
             );
         }
         let netlist = Netlist::elaborate(&m.finish().expect("a register"));

@@ -76,13 +76,13 @@ struct Nets {
 impl Nets {
     /// Slews at a cell's pins and loads at its outputs.
     fn at(&self, cell: &FlatCell) -> Conditions {
-        let load = |net: NetId| self.loads.get(net.index()).copied();
-        let slew = |net: NetId| self.slews.get(net.index()).copied();
+        let load = |net: NetId| self.loads[net.index()];
+        let slew = |net: NetId| self.slews[net.index()];
         Conditions {
             slews: cell
                 .inputs
-                .map(|net| slew(net).unwrap_or([self.input_slew_fs; 2])),
-            loads: cell.outputs.map(|net| load(net).unwrap_or_default()),
+                .map(|net| net.map_or([self.input_slew_fs; 2], slew)),
+            loads: cell.outputs.map(|net| net.map(load).unwrap_or_default()),
         }
     }
 }
@@ -187,7 +187,7 @@ impl Characterised {
     ) -> [f64; 2] {
         let first = netlist.cells_of(scope).start;
         let cells = first..first + netlist.scopes()[scope].module.total_cells();
-        let of = |net: NetId| if net.is_some() { changes(net) } else { 0.0 };
+        let of = |net: Option<NetId>| net.map_or(0.0, &changes);
         let each = cells.map(|cell| {
             let (composite, conditions) = self.instance(netlist, &library.map, cell);
             let leaf = &netlist.cells()[cell];
@@ -259,7 +259,7 @@ fn composite<'m>(
     Composite {
         recipe,
         drives: &drives[cell][..recipe.stages.len()],
-        is_connected: netlist.cells()[cell].outputs.map(NetId::is_some),
+        is_connected: netlist.cells()[cell].outputs.map(|net| net.is_some()),
     }
 }
 
@@ -320,8 +320,7 @@ impl<'w> Work<'w> {
         let outside: Vec<usize> = outside.collect();
         let mut readers = vec![Vec::new(); netlist.net_count()];
         for &index in &outside {
-            let inputs = netlist.cells()[index].inputs.iter();
-            for net in inputs.filter(|net| net.is_some()) {
+            for net in netlist.cells()[index].input_nets() {
                 readers[net.index()].push(index as u32);
             }
         }
@@ -350,12 +349,7 @@ impl<'w> Work<'w> {
         let mut loads = vec![[0.0; 2]; self.netlist.net_count()];
         for (index, cell) in self.netlist.cells().iter().enumerate() {
             let composite = self.composite(index);
-            for (pin, net) in cell
-                .inputs
-                .iter()
-                .enumerate()
-                .filter(|(_, net)| net.is_some())
-            {
+            for (pin, net) in cell.input_nets().enumerate() {
                 let own = composite.input_load(pin);
                 let load = &mut loads[net.index()];
                 *load =
@@ -413,7 +407,7 @@ impl<'w> Work<'w> {
             let found = self.composite(cell).output_slews(&self.nets.at(leaf));
             let outputs = leaf.outputs;
             for (net, slew) in outputs.iter().zip(found) {
-                let (true, Some(slew)) = (net.is_some(), slew) else {
+                let (Some(net), Some(slew)) = (net, slew) else {
                     continue;
                 };
                 let known = &mut self.nets.slews[net.index()];

@@ -120,14 +120,14 @@ pub fn write_constraints(
     let others = netlist.cells().iter().enumerate();
     let others =
         others.filter(|(cell, leaf)| leaf.kind.is_flip_flop() && !clocking.ripple.contains(cell));
-    let outside: BTreeSet<NetId> = others.map(|(_, leaf)| leaf.inputs[1]).collect();
+    let outside: BTreeSet<NetId> = others.map(|(_, leaf)| leaf.input(1)).collect();
     let mut divided: Vec<(NetId, String)> = Vec::new();
     // Second outputs of flip-flops: what the first one clocks does not meet them.
     let mut second: Vec<usize> = Vec::new();
     for (index, &cell) in clocking.ripple.iter().enumerate() {
         // What comes back to an earlier one, as LOCAL_STOP does to block COUNTER_CLK, gates a clock and is none.
         let later = clocking.ripple[index + 1..].iter();
-        let later: BTreeSet<NetId> = later.map(|&cell| netlist.cells()[cell].inputs[1]).collect();
+        let later: BTreeSet<NetId> = later.map(|&cell| netlist.cells()[cell].input(1)).collect();
         let leaf = &netlist.cells()[cell];
         let (composite, _) = characterised.instance(netlist, &library.map, cell);
         let path = netlist.cell_path(cell);
@@ -137,7 +137,7 @@ pub fn write_constraints(
         let made = divided.iter().find(|(net, _)| {
             Edge::BOTH
                 .iter()
-                .any(|&edge| reaches(netlist, (*net, edge), leaf.inputs[1]))
+                .any(|&edge| reaches(netlist, (*net, edge), leaf.input(1)))
         });
         let (from, at, master) = match made {
             Some((net, name)) => {
@@ -150,7 +150,7 @@ pub fn write_constraints(
             }
         };
         // Timing analysers take the edges of the source as they are there, whatever inverts them on the way.
-        let source = match reaches(netlist, (from, Edge::Rise), leaf.inputs[1]) {
+        let source = match reaches(netlist, (from, Edge::Rise), leaf.input(1)) {
             true => format!(
                 "-source [get_pins {{{}/{}}}]{master} -divide_by 2",
                 composite.instance_name(&path, stage),
@@ -162,7 +162,7 @@ pub fn write_constraints(
             divided.len(),
             leaf.outputs.iter().zip(&composite.recipe.outputs),
         );
-        for (&net, &output) in outputs.filter(|(net, _)| net.is_some()) {
+        for (net, &output) in outputs.filter_map(|(&net, output)| Some((net?, output))) {
             let Source::Stage(stage, pin) = output else {
                 continue;
             };
@@ -217,9 +217,9 @@ fn reaches(netlist: &Netlist, from: (NetId, Edge), to: NetId) -> bool {
             .iter()
             .filter(|cell| !cell.kind.is_flip_flop())
         {
-            for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.inputs[pin] == net) {
+            for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.input(pin) == net) {
                 let after = caused(cell.kind, pin, edge, 0).iter();
-                let after = after.map(|&edge| (cell.outputs[0], edge));
+                let after = after.filter_map(|&edge| Some((cell.outputs[0]?, edge)));
                 behind.extend(after.filter(|&(net, edge)| seen.insert((net, edge as usize))));
             }
         }

@@ -62,9 +62,10 @@ pub fn write_mapped(
         let inner = |stage: usize, output: usize| format!("\\{path}.{stage}.{output} ");
         let driven = |stage: usize, output: usize| {
             let mut outputs = composite.recipe.outputs.iter().zip(&cell.outputs);
-            let found = outputs
-                .find(|(source, net)| **source == Source::Stage(stage, output) && net.is_some());
-            found.map(|(_, &net)| of_net(net).clone())
+            outputs.find_map(|(source, net)| {
+                let net = net.filter(|_| *source == Source::Stage(stage, output))?;
+                Some(of_net(net).clone())
+            })
         };
         for stage in composite.used() {
             let model = composite.cell(stage);
@@ -93,7 +94,7 @@ pub fn write_mapped(
             {
                 let net = match *source {
                     Source::Constant(level) => format!("1'b{}", u8::from(level)),
-                    Source::Input(pin) => of_net(cell.inputs[pin]).clone(),
+                    Source::Input(pin) => of_net(cell.input(pin)).clone(),
                     Source::Stage(stage, output) => {
                         driven(stage, output).unwrap_or_else(|| inner(stage, output))
                     }

@@ -23,7 +23,7 @@ pub(super) fn write_wires(
     }
     let mut pins = vec![0_u32; netlist.net_count()];
     for cell in netlist.cells() {
-        for net in &cell.inputs[..cell.kind.inputs().len()] {
+        for net in cell.input_nets() {
             pins[net.index()] += 1;
         }
     }

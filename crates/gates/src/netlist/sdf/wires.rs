@@ -26,7 +26,7 @@ impl Annotator<'_, '_, '_> {
         {
             let flat = self.netlist.cells()[cell];
             let pin = self.input(flat.kind, name, delay.line)?;
-            if flat.inputs[pin] != source {
+            if source.is_none() || flat.inputs[pin] != source {
                 let message = format!("{from} and {to} are not connected; correct one of the two");
                 return self.error(delay.line, message);
             }
@@ -45,7 +45,7 @@ impl Annotator<'_, '_, '_> {
         path: &str,
         line: usize,
         port: Direction,
-    ) -> Result<NetId, InputError> {
+    ) -> Result<Option<NetId>, InputError> {
         let full = join(scope, path);
         if let Some((instance, name)) = full.rsplit_once('.')
             && let Some(cell) = self.netlist.cell(instance)
@@ -60,7 +60,7 @@ impl Annotator<'_, '_, '_> {
             .port_signals()
             .any(|(direction, s)| direction == port && s.name == signal);
         match self.netlist.net(&full) {
-            Some(net) if is_port => Ok(net),
+            Some(net) if is_port => Ok(Some(net)),
             _ => self.error(
                 line,
                 format!(

@@ -123,10 +123,9 @@ impl<'a> NetNames<'a> {
     }
 
     /// A Verilog expression for `nets` (bit 0 first): a name, a slice, or a concatenation.
-    fn expression(&self, nets: &[Net]) -> String {
-        if nets.iter().all(|n| !n.is_some()) {
-            return String::new();
-        }
+    fn expression(&self, nets: &[Option<Net>]) -> String {
+        // A port is open as a whole or not at all.
+        let nets: Vec<Net> = nets.iter().copied().flatten().collect();
         let mut parts = Vec::new();
         let mut i = 0;
         while i < nets.len() {
@@ -147,6 +146,7 @@ impl<'a> NetNames<'a> {
             i += length;
         }
         match &parts[..] {
+            [] => String::new(),
             [one] => one.clone(),
             many => {
                 let reversed: Vec<&str> = many.iter().rev().map(String::as_str).collect();

@@ -117,14 +117,14 @@ impl<'d> Placing<'d> {
         self.constants[usize::from(value)]
     }
 
-    fn add(&mut self, kind: CellKind, inputs: &[Net], outputs: &[Net]) {
+    fn add(&mut self, kind: CellKind, inputs: &[Net], outputs: &[Option<Net>]) {
         let name = format!("cell_{}", self.placed);
         self.placed += 1;
         self.m.cell(&name, kind, inputs, outputs);
     }
 
     pub(super) fn gate_into(&mut self, kind: CellKind, inputs: &[Net], output: Net) {
-        self.add(kind, inputs, &[output]);
+        self.add(kind, inputs, &[Some(output)]);
     }
 
     fn gate(&mut self, kind: CellKind, inputs: &[Net]) -> Net {
@@ -154,7 +154,7 @@ impl<'d> Placing<'d> {
         given: &Given<'_>,
         [data, clock]: [Net; 2],
         controls: [Option<Net>; 2],
-        [q, qn]: [Net; 2],
+        [q, qn]: [Option<Net>; 2],
     ) -> Result<(), YosysError> {
         match controls {
             [Some(reset), Some(set)] => self.add(Dffsr, &[data, clock, reset, set], &[q, qn]),
@@ -360,7 +360,6 @@ impl FlipFlop {
         let mut data = to.pin(given, "D")?;
         let q = to.pin(given, "Q")?;
         let qn = given.inverse_of_q().and_then(|n| to.nets.get(&n).copied());
-        let qn = qn.unwrap_or(Net::NONE);
         let clock = to.pin(given, "C")?;
         let clock = to.high(clock, self.clock);
         let is_enabled_first = !self.enable_wins;
@@ -390,7 +389,12 @@ impl FlipFlop {
             let zero = to.not(value);
             let set = to.gate(And2, &[load, value]);
             let reset = to.gate(And2, &[load, zero]);
-            return to.flip_flop(given, [data, clock], [Some(reset), Some(set)], [q, qn]);
+            return to.flip_flop(
+                given,
+                [data, clock],
+                [Some(reset), Some(set)],
+                [Some(q), qn],
+            );
         }
         let (mut reset, mut set) = (None, None);
         if let Some((set_high, reset_high)) = self.set_and_reset {
@@ -400,7 +404,7 @@ impl FlipFlop {
             let net = active(to, "R", is_high)?;
             *(if value { &mut set } else { &mut reset }) = Some(net);
         }
-        to.flip_flop(given, [data, clock], [reset, set], [q, qn])
+        to.flip_flop(given, [data, clock], [reset, set], [Some(q), qn])
     }
 
     /// D, or Q where an enable is off.

@@ -30,7 +30,7 @@ pub(super) fn place(
         let is_open = given.of.connections.get(name).is_none_or(Vec::is_empty);
         (!is_open).then(|| to.pin(given, name))
     });
-    let [q, qn] = outputs.map(|output| output.unwrap_or(Ok(Net::NONE)));
+    let [q, qn] = outputs.map(Option::transpose);
     to.flip_flop(given, [data, clock], [reset, set], [q?, qn?])
 }
 
