@@ -460,11 +460,13 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
                     })
                     .collect();
                 now += step;
-                kernel.run(
-                    &mut drives.into_iter().peekable(),
-                    now - Time::from_fs(1),
-                    &mut (),
-                );
+                kernel
+                    .run(
+                        &mut drives.into_iter().peekable(),
+                        now - Time::from_fs(1),
+                        &mut (),
+                    )
+                    .unwrap();
                 let expected = (0..64).fold(0, |word, lane| {
                     let is_met = correlation::model(upper << 6 | lane, event_type, t);
                     word | u64::from(is_met) << lane

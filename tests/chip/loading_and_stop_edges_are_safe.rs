@@ -3,7 +3,7 @@
 
 use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, Window, WindowLaw, macropixel};
 use guided_dtof::engine::{self as fast, Cancelling, Cycle, Gate, GateSimulation, Replay};
-use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, clock, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks, clock};
 use guided_dtof::netlist::{CellKind, CheckKind, Corner, Library, NetId, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::stimulus::{HardwareEventKind, HardwareEvents};
@@ -74,11 +74,13 @@ impl Bench {
             .policy(Policy::ReportOnly)
             .not_before(ns(20));
         let end = stop(4);
-        kernel.run(
-            &mut in_order(drives),
-            end,
-            &mut (&mut recorder, (&mut events, &mut checks)),
-        );
+        kernel
+            .run(
+                &mut Stimulus::sorted(drives),
+                end,
+                &mut (&mut recorder, (&mut events, &mut checks)),
+            )
+            .unwrap();
         let found = events.report.hardware_events.iter();
         Bench {
             exposure,

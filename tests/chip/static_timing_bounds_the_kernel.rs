@@ -7,7 +7,7 @@ use guided_dtof::chip::{
     Overflow, PCounter, SensorConfig, correlation, front_end, histogram, load_path, metdc,
     p_counter,
 };
-use guided_dtof::kernel::{Drive, Kernel, Observer, merge};
+use guided_dtof::kernel::{Drive, Kernel, Observer, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
     ArcDelay, CellKind, Corner, Edge, Library, Module, ModuleBuilder, NetId, Netlist, StaticTiming,
@@ -61,8 +61,10 @@ fn check(
             from: now,
             seen: Vec::new(),
         };
-        let mut stimulus = merge([Box::new(drives) as Box<dyn Iterator<Item = Drive> + Send>]);
-        kernel.run(&mut stimulus, now + GAP - Time::from_fs(1), &mut changes);
+        let mut stimulus = Stimulus::new(drives);
+        kernel
+            .run(&mut stimulus, now + GAP - Time::from_fs(1), &mut changes)
+            .unwrap();
         for (time, net, value) in changes.seen.into_iter().filter(|_| index > 1) {
             let edge = Edge::to(value).expect("everything is known after the reset");
             let window = arrivals.edge_window(net, edge);
@@ -192,9 +194,9 @@ proptest! {
             drive(40 + 10 * edge, clk, true);
             drive(45 + 10 * edge, clk, false);
         }
-        let mut stimulus = merge([Box::new(drives.into_iter()) as Box<dyn Iterator<Item = Drive> + Send>]);
+        let mut stimulus = Stimulus::new(drives);
         let mut recorder = guided_dtof::kernel::Recorder::new([stop]);
-        Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(last + 20), &mut recorder);
+        Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(last + 20), &mut recorder).unwrap();
         prop_assert_eq!(recorder.rising_edges(stop), [Time::from_ns(last) + longest]);
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use bench::{SETTLING, corners};
 use guided_dtof::chip::tdc::{clock_counter, delay_line, ring_oscillator};
-use guided_dtof::kernel::{Drive, Kernel, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Corner, Library, Mismatch, Module, Netlist, Timing, varied};
 use guided_dtof::units::Time;
@@ -67,15 +67,17 @@ impl Converter {
         }
         let code = self.netlist.signal(code).unwrap();
         let mut kernel = Kernel::new(&self.netlist, &self.timing);
-        let mut stimulus = in_order(drives);
+        let mut stimulus = Stimulus::sorted(drives);
         let slots = 1..=intervals.len() as i64;
         slots
             .map(|slot| {
-                kernel.run(
-                    &mut stimulus,
-                    SLOT * slot - SETTLING - Time::from_fs(1),
-                    &mut (),
-                );
+                kernel
+                    .run(
+                        &mut stimulus,
+                        SLOT * slot - SETTLING - Time::from_fs(1),
+                        &mut (),
+                    )
+                    .unwrap();
                 kernel.number(&code)
             })
             .collect()

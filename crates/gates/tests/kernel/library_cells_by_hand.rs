@@ -1,7 +1,7 @@
 //! Cells of `vectors/liberty/example.lib`, whose tables are straight lines (`make.py` beside it): delays, limits, energies, area and
 //! leakage by hand.
 
-use femtogate::kernel::{Drive, Kernel, Recorder, in_order};
+use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
 use femtogate::logic::Logic;
 use femtogate::netlist::liberty::{Characterised, Environment, Liberty};
 use femtogate::netlist::{CellKind, CheckKind, Control, Edge, ModuleBuilder, Netlist};
@@ -62,13 +62,21 @@ fn delays_of_a_gate_of_two_cells() {
     let drives = drives.map(|(ns, net, value)| Drive::new(Time::from_ns(ns), net, value));
     let mut seen = Recorder::new([a, b, z]);
     let mut kernel = Kernel::new(&netlist, &made.timing);
-    kernel.run(&mut in_order(drives.to_vec()), Time::from_ns(3), &mut seen);
+    kernel
+        .run(
+            &mut Stimulus::sorted(drives.to_vec()),
+            Time::from_ns(3),
+            &mut seen,
+        )
+        .unwrap();
     assert_eq!(kernel.number(&[a, b, z]), Some(0b111));
-    kernel.run(
-        &mut in_order(drives[3..].to_vec()),
-        Time::from_ns(6),
-        &mut seen,
-    );
+    kernel
+        .run(
+            &mut Stimulus::sorted(drives[3..].to_vec()),
+            Time::from_ns(6),
+            &mut seen,
+        )
+        .unwrap();
     assert_eq!(kernel.number(&[a, b, z]), Some(0b010));
     // The NAND's edge is the inverse one, and its slew what the inverter sees.
     let by_hand = |nand: f64, inverter: f64| {

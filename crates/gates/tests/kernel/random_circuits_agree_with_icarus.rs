@@ -26,7 +26,7 @@ use std::fmt::Write as _;
 use std::io::Cursor;
 use std::time::Instant;
 
-use femtogate::kernel::{Drive, Kernel, merge};
+use femtogate::kernel::{Drive, Kernel, Stimulus};
 use femtogate::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use femtogate::netlist::{
     Corner, Netlist, Timing, write_cells, write_delays, write_modules, write_parametric_cells,
@@ -60,8 +60,8 @@ fn simulate(
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
     let mut kernel = Kernel::new(netlist, timing);
-    let mut stimulus = merge([Box::new(drives.into_iter()) as Box<_>]);
-    kernel.run(&mut stimulus, end, &mut writer);
+    let mut stimulus = Stimulus::new(drives);
+    kernel.run(&mut stimulus, end, &mut writer).unwrap();
     let top = &netlist.scopes()[0].name;
     Waves::read(Cursor::new(writer.finish(end).unwrap()), top)
 }

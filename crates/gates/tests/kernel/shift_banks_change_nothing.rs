@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use femtogate::kernel::{Drive, Kernel, in_order};
+use femtogate::kernel::{Drive, Kernel, Stimulus};
 use femtogate::logic::Logic;
 use femtogate::netlist::{CellKind, Corner, Library, Module, ModuleBuilder, Netlist, Timing};
 use femtogate::units::Time;
@@ -40,7 +40,9 @@ fn register(stages: usize, watched: impl IntoIterator<Item = usize>) -> Arc<Modu
 fn changes(netlist: &Netlist, timing: &Timing, drives: Vec<Drive>) -> Vec<Change> {
     let mut trace = Trace::default();
     let end = drives.last().expect("drives").time + Time::from_ns(2);
-    Kernel::new(netlist, timing).run(&mut in_order(drives), end, &mut trace);
+    Kernel::new(netlist, timing)
+        .run(&mut Stimulus::sorted(drives), end, &mut trace)
+        .unwrap();
     trace.0.sort_by_key(|&(time, net, _)| (time, net));
     trace.0
 }

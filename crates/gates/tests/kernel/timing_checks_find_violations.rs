@@ -1,9 +1,7 @@
 //! Timing checks find every violation with its exact slack and nothing else: hand-made ones at the limit's very
 //! femtosecond, random ones are in `violations_are_those_of_the_definitions`.
 
-use femtogate::kernel::{
-    CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, in_order, merge,
-};
+use femtogate::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks};
 use femtogate::logic::Logic;
 use femtogate::netlist::sdf::{Sdf, annotate};
 use femtogate::netlist::{
@@ -45,9 +43,14 @@ pub fn simulate(
         let net = netlist.net(pin).unwrap();
         Drive::new(Time::from_fs(fs), net, value)
     });
-    let stream: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives);
     let end = Time::from_fs(4 * EDGE);
-    kernel.run(&mut merge([stream]), end, &mut (&mut trace, &mut checks));
+    kernel
+        .run(
+            &mut Stimulus::new(drives),
+            end,
+            &mut (&mut trace, &mut checks),
+        )
+        .unwrap();
     (checks.report(netlist), trace, kernel)
 }
 
@@ -173,8 +176,10 @@ fn each_control_is_judged_by_its_own_limit() {
         let drives = steps.into_iter().map(|(fs, pin, value)| {
             Drive::new(Time::from_fs(fs), netlist.net(pin).unwrap(), value)
         });
-        let mut drives = in_order(drives.collect());
-        Kernel::new(&netlist, &timing).run(&mut drives, Time::from_fs(2 * EDGE), &mut checks);
+        let mut drives = Stimulus::sorted(drives);
+        Kernel::new(&netlist, &timing)
+            .run(&mut drives, Time::from_fs(2 * EDGE), &mut checks)
+            .unwrap();
         let report = checks.report(&netlist);
         let first = report.violations.iter().filter(|v| v.cell == "pair.first");
         let slacks: Vec<_> = first.map(|v| v.slack_fs).collect();
@@ -277,9 +282,14 @@ fn nothing_is_judged_before_its_time_but_earlier_events_are_remembered() {
         let drives = drives.into_iter().map(|(fs, pin, value)| {
             Drive::new(Time::from_fs(fs), netlist.net(pin).unwrap(), value)
         });
-        let stream: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives);
         let mut kernel = Kernel::new(&netlist, &timing);
-        kernel.run(&mut merge([stream]), Time::from_fs(2 * EDGE), &mut checks);
+        kernel
+            .run(
+                &mut Stimulus::new(drives),
+                Time::from_fs(2 * EDGE),
+                &mut checks,
+            )
+            .unwrap();
         checks.report(&netlist).violated()
     };
     assert_eq!(run(EDGE), 1);

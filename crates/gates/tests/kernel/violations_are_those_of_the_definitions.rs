@@ -7,7 +7,7 @@ use crate::timing_checks_find_violations::{Script, pair, simulate};
 
 use std::cell::Cell;
 
-use femtogate::kernel::{CheckReport, Kernel, Policy, Recorder, TimingChecks, in_order};
+use femtogate::kernel::{CheckReport, Kernel, Policy, Recorder, Stimulus, TimingChecks};
 use femtogate::logic::Logic;
 use femtogate::netlist::{
     CellKind, CheckKind, CheckLimits, Corner, DataLimit, Delay, Edge, Library, NetId, Netlist,
@@ -189,7 +189,13 @@ fn judge_netlist(
     let mut kernel = Kernel::new(&netlist, &case.timing(&netlist));
     let drives = case.drives(&netlist);
     let end = drives.last().map_or(Time::ZERO, |d| d.time) + Time::from_ns(2);
-    kernel.run(&mut in_order(drives), end, &mut (&mut trace, &mut checks));
+    kernel
+        .run(
+            &mut Stimulus::sorted(drives),
+            end,
+            &mut (&mut trace, &mut checks),
+        )
+        .unwrap();
     let report = checks.report(&netlist);
     judged(&netlist, &report, &trace, limits)?;
     Ok(CheckKind::ALL.map(|kind| {

@@ -156,8 +156,7 @@ fn simulate(
     kept: Option<(i64, i64)>,
 ) -> Simulated {
     let end = drives.last().unwrap().time + Time::from_ns(3);
-    let drives: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives.into_iter());
-    let mut stimulus: Stimulus = drives.peekable();
+    let mut stimulus = Stimulus::new(drives);
     let selection = Selection::all().with_anonymous();
     let mut vcd = VcdWriter::new(Vec::new(), netlist, &selection).unwrap();
     let mut fst = FstWriter::new(Cursor::new(Vec::new()), netlist, &selection).unwrap();
@@ -171,7 +170,7 @@ fn simulate(
     let recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
     let mut observers = (recorder, (vcd, fst));
     let mut kernel = Kernel::new(netlist, &Timing::nominal(netlist, library, Corner::Typ));
-    kernel.run(&mut stimulus, end, &mut observers);
+    kernel.run(&mut stimulus, end, &mut observers).unwrap();
     let (recorder, (vcd, fst)) = observers;
     let vcd = String::from_utf8(vcd.finish(end).unwrap()).unwrap();
     let fst = fst.finish(end).unwrap().into_inner();

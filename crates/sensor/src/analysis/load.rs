@@ -115,8 +115,12 @@ pub fn load_works(
         let mut kernel = Kernel::new(&netlist, &timing);
         let settled = end + Time::from_ns(5);
         match limits {
-            Limits::Kept => kernel.run(&mut stimulus, settled, &mut checks),
-            Limits::Ignored => kernel.run(&mut stimulus, settled, &mut ()),
+            Limits::Kept => kernel
+                .run(&mut stimulus, settled, &mut checks)
+                .expect("no loop of cells without delay"),
+            Limits::Ignored => kernel
+                .run(&mut stimulus, settled, &mut ())
+                .expect("no loop of cells without delay"),
         }
         let mut memories = memories.iter().zip(&starts);
         let is_right = memories.all(|(nets, &start)| kernel.number(nets) == Some(start.into()));

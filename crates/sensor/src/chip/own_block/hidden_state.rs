@@ -487,7 +487,9 @@ impl<'c> Load<'c> {
             values: Lanes::known(word),
         });
         self.now += SHORTEST_PAUSE;
-        self.kernel.run(&mut drives.peekable(), self.now, &mut ());
+        self.kernel
+            .run(&mut drives.peekable(), self.now, &mut ())
+            .expect("no loop of cells without delay");
     }
 
     fn set(&mut self, pin: Probe, value: bool) {
