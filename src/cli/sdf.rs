@@ -10,11 +10,11 @@ use super::SensorArgs;
 use super::voice::{note, progress, tell};
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
-use crate::netlist::sdf::{
+use crate::netlist::{Corner, Netlist, Timing};
+use crate::sdf::{
     Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities,
     write_library_sdf, write_sdf,
 };
-use crate::netlist::{Corner, Netlist, Timing};
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Divider {

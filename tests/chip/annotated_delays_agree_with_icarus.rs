@@ -8,9 +8,9 @@ use std::collections::HashSet;
 
 use guided_dtof::chip::{Exposure, SensorConfig, array};
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::netlist::{Corner, Library, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
+use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use icarus::{Seen, random_delays};

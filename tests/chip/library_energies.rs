@@ -3,7 +3,7 @@
 use crate::library_chips;
 use crate::tool;
 
-use guided_dtof::netlist::liberty::{Characterised, Environment, Liberty, write_mapped};
+use guided_dtof::liberty::{Characterised, Environment, Liberty, write_mapped};
 use guided_dtof::netlist::{CellKind, ModuleBuilder, Netlist};
 
 /// OpenSTA 2.0.17 charges both energies, of rise and fall, at every change; we charge one of them, on average.

@@ -16,12 +16,11 @@ use std::process::Command;
 
 use guided_dtof::chip::{PCounter, SensorConfig, array, hslidar_delay_line, quantic4x4};
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
-use guided_dtof::netlist::{
-    CellKind, Corner, Library, Netlist, Timing, write_cells, write_standard_cells,
-};
+use guided_dtof::netlist::{CellKind, Corner, Library, Netlist, Timing};
+use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
+use guided_dtof::verilog::{write_cells, write_standard_cells};
 use icarus::Seen;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;

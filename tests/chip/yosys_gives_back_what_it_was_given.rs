@@ -17,9 +17,10 @@ use guided_dtof::chip::p_counter::{self, starts_high};
 use guided_dtof::chip::{
     Overflow, OwnBlock, SensorConfig, Window, WindowLaw, correlation, histogram, metdc, readout,
 };
-use guided_dtof::netlist::{Corner, Library, Module, write_modules, write_standard_cells};
+use guided_dtof::netlist::{Corner, Library, Module};
 use guided_dtof::settings::Document;
 use guided_dtof::units::Time;
+use guided_dtof::verilog::{write_modules, write_standard_cells};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 /// What Yosys writes of the Verilog in `folder/block.v` as generic gates, or what `mapping` makes of them; none where it is not installed.

@@ -3,11 +3,15 @@
 
 mod complaint;
 pub mod kernel;
+pub mod liberty;
 pub mod logic;
 pub mod netlist;
 mod origin;
+pub mod sdf;
 pub mod units;
+pub mod verilog;
 pub mod waves;
+pub mod yosys;
 
 pub use complaint::{InputError, in_words, instead_of, nearest};
 pub use origin::Origin;

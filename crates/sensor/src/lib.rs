@@ -17,5 +17,5 @@ pub mod ranging;
 pub mod stimulus;
 pub mod waves;
 
-pub use femtogate::{Origin, kernel, logic, netlist};
+pub use femtogate::{Origin, kernel, liberty, logic, netlist, sdf, verilog};
 pub use guided_dtof_light::{files, numerics, photon, settings, theory, units};

@@ -22,8 +22,8 @@ mod tests {
     use crate::kernel::{Drive, Kernel, LaneDrive, LaneKernel, Lanes, Stimulus};
     use crate::logic::Logic;
     use crate::netlist::{
-        ArcDelay, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, NetId,
-        Netlist, Timing,
+        ArcDelay, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, Netlist,
+        Timing,
     };
     use crate::units::Time;
 

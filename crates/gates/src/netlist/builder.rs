@@ -217,7 +217,7 @@ impl ModuleBuilder {
     }
 
     /// A new net without a name of its own.
-    pub(super) fn unnamed(&mut self) -> Net {
+    pub(crate) fn unnamed(&mut self) -> Net {
         let name = format!("n{}", self.module.net_count);
         self.declare(name, 1, false, false)[0]
     }
@@ -379,7 +379,7 @@ impl ModuleBuilder {
     }
 }
 
-pub(super) fn is_identifier(name: &str) -> bool {
+pub(crate) fn is_identifier(name: &str) -> bool {
     let mut bytes = name.bytes();
     bytes
         .next()

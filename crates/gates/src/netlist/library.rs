@@ -36,7 +36,7 @@ impl TimingArc {
     }
 
     /// The same in every corner.
-    pub(super) const fn fixed(delay: ArcDelay) -> Self {
+    pub(crate) const fn fixed(delay: ArcDelay) -> Self {
         TimingArc {
             rise: Delay::fixed(delay.rise_fs),
             fall: Delay::fixed(delay.fall_fs),
@@ -109,7 +109,7 @@ impl Library {
     }
 
     /// Delays of one cell in a corner.
-    pub(super) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
+    pub(crate) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
         let arc = |arc: TimingArc| ArcDelay {
             rise_fs: arc.rise.at(corner),
             fall_fs: arc.fall.at(corner),

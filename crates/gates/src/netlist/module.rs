@@ -122,7 +122,7 @@ impl Module {
 
 impl Names {
     /// The names of a complete module.
-    pub(super) fn of(module: &Module) -> Self {
+    pub(crate) fn of(module: &Module) -> Self {
         let index = |i: usize| i as u32;
         let mut scopes = 1;
         let mut instances = HashMap::with_capacity(module.instances.len());
@@ -190,7 +190,7 @@ impl Module {
     }
 
     /// How many scopes after this module's the one of its instance `name` comes in an elaborated design.
-    pub(super) fn scope_offset(&self, name: &str) -> Option<usize> {
+    pub(crate) fn scope_offset(&self, name: &str) -> Option<usize> {
         let offset = self.names.instances.get(name)?;
         Some(*offset as usize)
     }

@@ -282,7 +282,7 @@ pub struct Arrivals<'n> {
 
 impl Arrivals<'_> {
     /// How long after its clock a flip-flop changes its own D, in the direction of `edge`, where D is one of its outputs.
-    pub(super) fn own_data(&self, cell: usize, edge: Edge) -> Option<Time> {
+    pub(crate) fn own_data(&self, cell: usize, edge: Edge) -> Option<Time> {
         const CLOCK: usize = 1;
         let leaf = &self.netlist.cells()[cell];
         let [data, ..] = leaf.inputs;

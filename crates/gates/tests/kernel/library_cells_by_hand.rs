@@ -2,8 +2,8 @@
 //! leakage by hand.
 
 use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
+use femtogate::liberty::{Characterised, Environment, Liberty};
 use femtogate::logic::Logic;
-use femtogate::netlist::liberty::{Characterised, Environment, Liberty};
 use femtogate::netlist::{CellKind, CheckKind, Control, Edge, ModuleBuilder, Netlist};
 use femtogate::units::Time;
 

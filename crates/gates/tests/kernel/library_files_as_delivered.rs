@@ -3,7 +3,7 @@
 
 use crate::tool;
 
-use femtogate::netlist::liberty::{
+use femtogate::liberty::{
     Characterised, Clocking, Environment, Liberty, write_constraints, write_mapped,
     write_mapped_cells, write_mapped_sdf,
 };

@@ -27,11 +27,10 @@ use std::io::Cursor;
 use std::time::Instant;
 
 use femtogate::kernel::{Drive, Kernel, Stimulus};
-use femtogate::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
-use femtogate::netlist::{
-    Corner, Netlist, Timing, write_cells, write_delays, write_modules, write_parametric_cells,
-};
+use femtogate::netlist::{Corner, Netlist, Timing};
+use femtogate::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use femtogate::units::Time;
+use femtogate::verilog::{write_cells, write_delays, write_modules, write_parametric_cells};
 use femtogate::waves::{Selection, VcdWriter};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, FileFailurePersistence, TestCaseError, TestError, TestRunner};

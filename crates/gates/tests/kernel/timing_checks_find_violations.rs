@@ -3,10 +3,10 @@
 
 use femtogate::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks};
 use femtogate::logic::Logic;
-use femtogate::netlist::sdf::{Sdf, annotate};
 use femtogate::netlist::{
     CellKind, CheckKind, Corner, Edge, Library, ModuleBuilder, NetId, Netlist, Timing,
 };
+use femtogate::sdf::{Sdf, annotate};
 use femtogate::units::Time;
 
 /// The clock edge, or whatever a test measures from.

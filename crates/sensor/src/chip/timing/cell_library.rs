@@ -18,7 +18,7 @@ use super::library_text::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::files::instead_of;
-use crate::netlist::liberty::{Characterised, Environment, Liberty};
+use crate::liberty::{Characterised, Environment, Liberty};
 use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.

@@ -1,11 +1,9 @@
 //! Wire delays: where INTERCONNECT and PORT end, and how they are added to the arcs of that pin.
 
 use super::annotate::{Annotator, Wire, causes};
-use super::{Edge, SdfDelay, join};
+use super::{SdfDelay, join};
 use crate::InputError;
-use crate::netlist::flat::NetId;
-use crate::netlist::module::Direction;
-use crate::netlist::timing::Timing;
+use crate::netlist::{Direction, Edge, NetId, Timing};
 
 const WIRE_TO_D: &str = "wires to D of a flip-flop";
 const WIRE_TO_OUTPUT: &str = "wires to outputs of the chip";
@@ -110,7 +108,7 @@ impl Annotator<'_, '_, '_> {
             for (delay, rises) in
                 arcs.flat_map(|arc| [(&mut arc.rise_fs, true), (&mut arc.fall_fs, false)])
             {
-                let by_edge = [(Edge::Rising, wire.rise_fs), (Edge::Falling, wire.fall_fs)];
+                let by_edge = [(Edge::Rise, wire.rise_fs), (Edge::Fall, wire.fall_fs)];
                 let causes = by_edge
                     .iter()
                     .filter(|(edge, _)| causes(kind, pin, *edge, rises))

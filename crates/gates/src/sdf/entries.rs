@@ -4,7 +4,8 @@ use std::borrow::Cow;
 
 use super::parser::{Parser, Result};
 use super::tokens::Token;
-use super::{CheckKind, DelayPath, Edge, PinEdge, SdfCheck, SdfDelay, Skipped, Triple};
+use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, Skipped, Triple};
+use crate::netlist::Edge;
 
 /// Longest delay or limit, fs: 4.29 µs, what delays are stored in.
 const LONGEST_FS: f64 = u32::MAX as f64;
@@ -142,8 +143,8 @@ impl<'a> Parser<'a, '_> {
         }
         self.take()?;
         let edge = match self.word("an edge")?.to_ascii_lowercase().as_str() {
-            "posedge" | "01" => Edge::Rising,
-            "negedge" | "10" => Edge::Falling,
+            "posedge" | "01" => Edge::Rise,
+            "negedge" | "10" => Edge::Fall,
             _ => {
                 return self
                     .error("the edge is neither posedge nor negedge; choose one of the two");
@@ -156,7 +157,10 @@ impl<'a> Parser<'a, '_> {
     }
 
     pub(super) fn check(&mut self, keyword: &str) -> Result<Option<SdfCheck<'a>>> {
-        let Some(kind) = CheckKind::ALL.into_iter().find(|k| k.keyword() == keyword) else {
+        let Some(kind) = CheckKeyword::ALL
+            .into_iter()
+            .find(|k| k.keyword() == keyword)
+        else {
             self.leave_out(keyword)?;
             return Ok(None);
         };
@@ -164,7 +168,7 @@ impl<'a> Parser<'a, '_> {
         let mut conditional = false;
         let pin = self.check_pin(&mut conditional)?;
         let reference = match kind {
-            CheckKind::Width => None,
+            CheckKeyword::Width => None,
             _ => Some(self.check_pin(&mut conditional)?),
         };
         let mut limits = [Triple::default(); 2];

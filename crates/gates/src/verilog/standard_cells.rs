@@ -1,7 +1,7 @@
 //! Cells as simulators, linters and synthesis expect them: function without time, and time in `specify` blocks.
 //!
 //! Path delays and limits are the library's, min:typ:max. They are what
-//! [`write_sdf`](crate::netlist::sdf::write_sdf) names, so that every entry of such a file finds its path or check.
+//! [`write_sdf`](crate::sdf::write_sdf) names, so that every entry of such a file finds its path or check.
 //! Flip-flops are user-defined primitives (UDP) with the transitions of [`next_state`](crate::netlist::next_state),
 //! unknown levels included. A notifier turns the state unknown when setup, hold, recovery or removal is broken; a
 //! broken width is reported alone, as by the event kernel.
@@ -25,15 +25,11 @@ use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use super::primitive;
-use crate::netlist::cell::CellKind;
-use crate::netlist::chain::Chain;
-use crate::netlist::corner::{Corner, Delay};
-use crate::netlist::instance_limits::InstanceLimits;
-use crate::netlist::library::Library;
-use crate::netlist::sdf::{CheckKind, Edge, PinEdge, SdfCheck, checks_of};
+use crate::netlist::{CellKind, Chain, Corner, Delay, Edge, InstanceLimits, Library};
+use crate::sdf::{CheckKeyword, PinEdge, SdfCheck, checks_of};
 
 /// What a file of cells begins with.
-pub(in crate::netlist) const HEAD: &str = "\
+pub(crate) const HEAD: &str = "\
 `timescale 1ps/1fs
 
 // With FUNCTIONAL, flip-flops are processes without notifiers, for tools that have no user-defined primitives.
@@ -80,7 +76,7 @@ endprimitive
 ";
 
 /// Transitions of DFFSR; the reset wins.
-pub(in crate::netlist) const DFFSR_STATE: &str = "
+pub(crate) const DFFSR_STATE: &str = "
 `ifndef FUNCTIONAL
 primitive DFFSR_STATE(q, d, ck, r, s, notifier);
   output q;
@@ -271,7 +267,7 @@ fn write_specify(
     if kind.is_flip_flop() {
         let limits = Corner::ALL.map(|corner| InstanceLimits::of(library.checks(kind), corner));
         for check in checks_of(kind, limits.each_ref()) {
-            if check.kind != CheckKind::Width || reader == Reader::Simulator {
+            if check.kind != CheckKeyword::Width || reader == Reader::Simulator {
                 writeln!(out, "    {};", system_task(&check, reader))?;
             }
         }
@@ -292,9 +288,9 @@ fn system_task(check: &SdfCheck<'_>, reader: Reader) -> String {
         Reader::Synthesis => "",
     };
     match check.kind {
-        CheckKind::Width => format!("$width({data}, {first})"),
-        CheckKind::RecRem => format!("$recrem({data}, {clock}, {first}, {second}{notifier})"),
-        CheckKind::SetupHold => {
+        CheckKeyword::Width => format!("$width({data}, {first})"),
+        CheckKeyword::RecRem => format!("$recrem({data}, {clock}, {first}, {second}{notifier})"),
+        CheckKeyword::SetupHold => {
             format!("$setuphold({clock}, {data}, {first}, {second}{notifier})")
         }
         _ => unreachable!("limits that come in pairs are given so"),
@@ -304,8 +300,8 @@ fn system_task(check: &SdfCheck<'_>, reader: Reader) -> String {
 fn event(pin: &PinEdge<'_>) -> String {
     let edge = match pin.edge {
         None => "",
-        Some(Edge::Rising) => "posedge ",
-        Some(Edge::Falling) => "negedge ",
+        Some(Edge::Rise) => "posedge ",
+        Some(Edge::Fall) => "negedge ",
     };
     format!("{edge}{}", pin.pin)
 }

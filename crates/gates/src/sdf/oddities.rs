@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::fmt;
 
 use super::{DelayPath, Sdf, SdfCell, SdfDelay, SdfInstance};
-use crate::netlist::corner::Corner;
+use crate::netlist::Corner;
 
 /// One of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

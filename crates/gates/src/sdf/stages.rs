@@ -3,9 +3,7 @@
 use super::annotate::Annotator;
 use super::{DelayPath, SdfCell};
 use crate::InputError;
-use crate::netlist::cell::{MAX_INPUTS, MAX_OUTPUTS};
-use crate::netlist::chain::Chain;
-use crate::netlist::{ArcDelay, Timing};
+use crate::netlist::{ArcDelay, Chain, MAX_INPUTS, MAX_OUTPUTS, Timing};
 
 impl Annotator<'_, '_, '_> {
     /// Takes the delays of one stage.

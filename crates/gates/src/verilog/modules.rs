@@ -8,8 +8,7 @@ use std::io::{self, Write};
 use std::sync::Arc as Shared;
 
 use super::TIMESCALE;
-use crate::netlist::chain::Chain;
-use crate::netlist::module::{Direction, Module, Net};
+use crate::netlist::{Chain, Direction, Module, Net};
 
 /// What Verilator need not mention with `-Wall`.
 const LINT: &str = "

@@ -11,13 +11,9 @@
 //! (15.8) has it for simulators without delayed copies of the pins.
 
 use super::annotate::Annotator;
-use super::{CheckKind as Entry, Edge as EntryEdge, PinEdge, SdfCell, SdfCheck, Triple};
+use super::{CheckKeyword as Entry, PinEdge, SdfCell, SdfCheck, Triple};
 use crate::InputError;
-use crate::netlist::cell::CellKind;
-use crate::netlist::check_limits::CheckKind;
-use crate::netlist::corner::Edge;
-use crate::netlist::instance_limits::{Control, InstanceLimits};
-use crate::netlist::timing::Timing;
+use crate::netlist::{CellKind, CheckKind, Control, Edge, InstanceLimits, Timing};
 
 const NO_SUCH_CHECK: &str = "checks of pins or edges that a flip-flop does not act on";
 const NEGATIVE: &str = "negative limits, which become 0";
@@ -42,7 +38,7 @@ impl Role {
 }
 
 /// A limit in the kernel's terms: check, control, and direction of D where only one is meant.
-type Slot = (CheckKind, Control, Option<EntryEdge>);
+type Slot = (CheckKind, Control, Option<Edge>);
 
 impl Annotator<'_, '_, '_> {
     /// Gives `cell` the limits of an entry.
@@ -94,8 +90,8 @@ fn slots(check: &SdfCheck<'_>) -> [Option<Slot>; 2] {
     let pin = Role::of(&check.pin.pin);
     let edge = check.pin.edge;
     if check.kind == Entry::Width {
-        let high = edge != Some(EntryEdge::Falling);
-        let low = edge != Some(EntryEdge::Rising);
+        let high = edge != Some(Edge::Fall);
+        let low = edge != Some(Edge::Rise);
         let slot = |is: bool, check, control| is.then_some((check, control, None));
         return match pin {
             Role::Clock => [
@@ -107,10 +103,10 @@ fn slots(check: &SdfCheck<'_>) -> [Option<Slot>; 2] {
         };
     }
     let clocked = check.reference.as_ref().is_some_and(|reference| {
-        Role::of(&reference.pin) == Role::Clock && reference.edge != Some(EntryEdge::Falling)
+        Role::of(&reference.pin) == Role::Clock && reference.edge != Some(Edge::Fall)
     });
     let data = |check| (pin == Role::Data && clocked).then_some((check, Control::Reset, edge));
-    let released = clocked && edge != Some(EntryEdge::Rising);
+    let released = clocked && edge != Some(Edge::Rise);
     let control = |check| match pin {
         Role::Control(control) if released => Some((check, control, None)),
         _ => None,
@@ -127,22 +123,15 @@ fn slots(check: &SdfCheck<'_>) -> [Option<Slot>; 2] {
 }
 
 fn enter(limits: &mut InstanceLimits, (check, control, edge): Slot, fs: u32) {
-    let directions = [
-        (Edge::Rise, EntryEdge::Rising),
-        (Edge::Fall, EntryEdge::Falling),
-    ];
-    for (direction, entry) in directions {
-        if edge.is_none_or(|edge| edge == entry) {
+    for direction in Edge::BOTH {
+        if edge.is_none_or(|edge| edge == direction) {
             limits.set(control, check, direction, fs);
         }
     }
 }
 
 /// The checks of a flip-flop with these limits in the three corners.
-pub(in crate::netlist) fn checks_of(
-    kind: CellKind,
-    corners: [&InstanceLimits; 3],
-) -> Vec<SdfCheck<'static>> {
+pub(crate) fn checks_of(kind: CellKind, corners: [&InstanceLimits; 3]) -> Vec<SdfCheck<'static>> {
     let limit = |control, check, edge| {
         Triple(corners.map(|limits| Some(limits.at(control, check, edge).into())))
     };
@@ -154,22 +143,19 @@ pub(in crate::netlist) fn checks_of(
         line: 0,
         kind,
         pin: checked,
-        reference: (kind != Entry::Width).then(|| pin(EntryEdge::Rising, "CK")),
+        reference: (kind != Entry::Width).then(|| pin(Edge::Rise, "CK")),
         limits,
     };
     let mut checks = Vec::new();
-    for (edge, direction) in [
-        (EntryEdge::Rising, Edge::Rise),
-        (EntryEdge::Falling, Edge::Fall),
-    ] {
+    for edge in Edge::BOTH {
         let limits = [CheckKind::Setup, CheckKind::Hold];
-        let limits = limits.map(|check| limit(Control::Reset, check, direction));
+        let limits = limits.map(|check| limit(Control::Reset, check, edge));
         checks.push(entry(Entry::SetupHold, pin(edge, "D"), limits));
     }
     let width = |check, control| [limit(control, check, Edge::Rise), Triple::default()];
     for (edge, check) in [
-        (EntryEdge::Rising, CheckKind::ClockHigh),
-        (EntryEdge::Falling, CheckKind::ClockLow),
+        (Edge::Rise, CheckKind::ClockHigh),
+        (Edge::Fall, CheckKind::ClockLow),
     ] {
         let limits = width(check, Control::Reset);
         checks.push(entry(Entry::Width, pin(edge, "CK"), limits));
@@ -180,9 +166,9 @@ pub(in crate::netlist) fn checks_of(
         }
         let limits = [CheckKind::Recovery, CheckKind::Removal];
         let limits = limits.map(|check| limit(control, check, Edge::Fall));
-        checks.push(entry(Entry::RecRem, pin(EntryEdge::Falling, name), limits));
+        checks.push(entry(Entry::RecRem, pin(Edge::Fall, name), limits));
         let limits = width(CheckKind::ControlHigh, control);
-        checks.push(entry(Entry::Width, pin(EntryEdge::Rising, name), limits));
+        checks.push(entry(Entry::Width, pin(Edge::Rise, name), limits));
     }
     checks
 }

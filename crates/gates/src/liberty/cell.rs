@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use super::complete::{self, Remark};
 use super::error::LibertyError;
-pub(in crate::netlist) use super::flip_flop::FlipFlop;
+pub(crate) use super::flip_flop::FlipFlop;
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
 use super::kit::LibraryFile;
@@ -18,7 +18,7 @@ use crate::netlist::{CheckKind, Edge};
 
 /// What a cell does, told without a look at its tables.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::netlist) enum Role {
+pub(crate) enum Role {
     /// One output that is a function of the inputs, in the order of [`Candidate::inputs`].
     Gate(TruthTable),
     /// A flip-flop whose next state is its data, once some inputs are tied to a level.
@@ -27,7 +27,7 @@ pub(in crate::netlist) enum Role {
 
 /// What a cell of the library does, for netlists that are mapped to it.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::netlist) struct CellFunction {
+pub(crate) struct CellFunction {
     pub inputs: Vec<String>,
     pub outputs: Vec<String>,
     pub role: Role,

@@ -23,10 +23,8 @@ use std::sync::Arc;
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
-use super::builder::is_identifier;
-use super::liberty::{CellFunction, Liberty};
-use super::module::{Module, Net};
-use super::{CellKind, ModuleBuilder};
+use crate::liberty::{CellFunction, Liberty};
+use crate::netlist::{CellKind, Module, ModuleBuilder, Net, is_identifier};
 use cells::{FlipFlop, Placing};
 pub use error::YosysError;
 use error::in_words;

@@ -17,7 +17,7 @@ use super::function::TruthTable;
 use super::read::Liberty;
 use super::verilog_name::in_verilog;
 use crate::netlist::Netlist;
-use crate::netlist::verilog::{DFFSR_STATE, HEAD};
+use crate::verilog::{DFFSR_STATE, HEAD};
 
 /// Writes a module for every library cell and drive in the netlist of [`write_mapped`](super::write_mapped).
 ///

@@ -58,7 +58,7 @@ pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_library_sdf, write_
 
 use std::borrow::Cow;
 
-use super::corner::Corner;
+use crate::netlist::{Corner, Edge};
 
 /// The dotted path of a name in a scope; the empty path is the top.
 fn join(path: &str, name: &str) -> String {
@@ -83,15 +83,6 @@ impl Triple {
     pub const fn at(self, corner: Corner) -> Option<i64> {
         self.0[corner as usize]
     }
-}
-
-/// Direction of a change of a pin.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Edge {
-    /// From 0 to 1.
-    Rising,
-    /// From 1 to 0.
-    Falling,
 }
 
 /// A pin, perhaps only one of its edges.
@@ -140,9 +131,9 @@ impl SdfDelay<'_> {
     }
 }
 
-/// Kinds of timing checks.
+/// What an entry checks, as SDF names it. The limits of a cell have a [`CheckKind`](crate::netlist::CheckKind) each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CheckKind {
+pub enum CheckKeyword {
     /// Data stable before the reference edge.
     Setup,
     /// Data stable after the reference edge.
@@ -159,35 +150,35 @@ pub enum CheckKind {
     Width,
 }
 
-impl CheckKind {
+impl CheckKeyword {
     /// Every kind.
-    pub const ALL: [CheckKind; 7] = [
-        CheckKind::Setup,
-        CheckKind::Hold,
-        CheckKind::SetupHold,
-        CheckKind::Recovery,
-        CheckKind::Removal,
-        CheckKind::RecRem,
-        CheckKind::Width,
+    pub const ALL: [CheckKeyword; 7] = [
+        CheckKeyword::Setup,
+        CheckKeyword::Hold,
+        CheckKeyword::SetupHold,
+        CheckKeyword::Recovery,
+        CheckKeyword::Removal,
+        CheckKeyword::RecRem,
+        CheckKeyword::Width,
     ];
 
     /// Keyword in SDF.
     pub const fn keyword(self) -> &'static str {
         match self {
-            CheckKind::Setup => "SETUP",
-            CheckKind::Hold => "HOLD",
-            CheckKind::SetupHold => "SETUPHOLD",
-            CheckKind::Recovery => "RECOVERY",
-            CheckKind::Removal => "REMOVAL",
-            CheckKind::RecRem => "RECREM",
-            CheckKind::Width => "WIDTH",
+            CheckKeyword::Setup => "SETUP",
+            CheckKeyword::Hold => "HOLD",
+            CheckKeyword::SetupHold => "SETUPHOLD",
+            CheckKeyword::Recovery => "RECOVERY",
+            CheckKeyword::Removal => "REMOVAL",
+            CheckKeyword::RecRem => "RECREM",
+            CheckKeyword::Width => "WIDTH",
         }
     }
 
     /// Number of limits.
     pub const fn limits(self) -> usize {
         match self {
-            CheckKind::SetupHold | CheckKind::RecRem => 2,
+            CheckKeyword::SetupHold | CheckKeyword::RecRem => 2,
             _ => 1,
         }
     }
@@ -199,12 +190,12 @@ pub struct SdfCheck<'a> {
     /// Line it stands in, from 1 (0 where it comes from no file).
     pub line: usize,
     /// What is checked.
-    pub kind: CheckKind,
-    /// The pin that must be stable; for [`CheckKind::Width`] the one whose pulse is measured.
+    pub kind: CheckKeyword,
+    /// The pin that must be stable; for [`CheckKeyword::Width`] the one whose pulse is measured.
     pub pin: PinEdge<'a>,
-    /// The edge it is measured against; none for [`CheckKind::Width`].
+    /// The edge it is measured against; none for [`CheckKeyword::Width`].
     pub reference: Option<PinEdge<'a>>,
-    /// Limits; the second only where [`CheckKind::limits`] is 2. They may be negative there.
+    /// Limits; the second only where [`CheckKeyword::limits`] is 2. They may be negative there.
     pub limits: [Triple; 2],
 }
 

@@ -24,12 +24,7 @@ use std::io::{self, Write};
 
 use super::{TIMESCALE, primitive};
 use crate::logic::Logic;
-use crate::netlist::cell::CellKind;
-use crate::netlist::chain::Chain;
-use crate::netlist::corner::Corner;
-use crate::netlist::flat::Netlist;
-use crate::netlist::library::{CellArcs, Library};
-use crate::netlist::{DelayModel, Timing};
+use crate::netlist::{CellArcs, CellKind, Chain, Corner, DelayModel, Library, Netlist, Timing};
 
 /// Lets every change of `value` arrive after its delay. One that overtakes others cancels them. The queue's last place
 /// has a variable, as an index that is a difference need not wrap at 8 bits.

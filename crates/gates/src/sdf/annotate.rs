@@ -2,13 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::{DelayPath, Edge, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
+use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
 use crate::InputError;
-use crate::netlist::cell::{CellKind, MAX_INPUTS};
-use crate::netlist::chain::Chain;
-use crate::netlist::corner::Corner;
-use crate::netlist::flat::Netlist;
-use crate::netlist::{ArcDelay, Timing};
+use crate::netlist::{ArcDelay, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing};
 
 /// What an annotation did.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -253,7 +249,7 @@ impl Annotator<'_, '_, '_> {
             let mut given = false;
             for (direction, delay) in [&mut arc.rise_fs, &mut arc.fall_fs].into_iter().enumerate() {
                 let all = || {
-                    (slots[pin][output].iter().zip([Edge::Rising, Edge::Falling]))
+                    (slots[pin][output].iter().zip(Edge::BOTH))
                         .filter(|(_, edge)| causes(kind, pin, *edge, direction == 0))
                         .filter_map(|(slot, _)| slot[direction])
                 };
@@ -286,7 +282,7 @@ impl Annotator<'_, '_, '_> {
         delay: &SdfDelay<'_>,
     ) {
         let values = [(delay.rise, before.rise_fs), (delay.fall, before.fall_fs)];
-        for (of_edge, slot) in [Edge::Rising, Edge::Falling].into_iter().zip(slots) {
+        for (of_edge, slot) in Edge::BOTH.into_iter().zip(slots) {
             if edge.is_some_and(|e| e != of_edge) {
                 continue;
             }
@@ -351,7 +347,7 @@ impl Annotator<'_, '_, '_> {
     ) -> Result<(), InputError> {
         let edges = match from.edge {
             Some(edge) => vec![edge],
-            None => vec![Edge::Rising, Edge::Falling],
+            None => Edge::BOTH.to_vec(),
         };
         let does_something =
             |&edge: &Edge| causes(kind, pin, edge, true) || causes(kind, pin, edge, false);
@@ -379,7 +375,7 @@ impl Annotator<'_, '_, '_> {
 /// Whether the delay to a rising (or falling) output of the cell matters to an edge of an input pin. A flip-flop's
 /// outputs may become unknown with any of its edges, after the shorter of both delays.
 pub(super) fn causes(kind: CellKind, pin: usize, edge: Edge, output_rises: bool) -> bool {
-    let rises = edge == Edge::Rising;
+    let rises = edge == Edge::Rise;
     match (kind, pin) {
         (CellKind::Inv | CellKind::Nand2 | CellKind::Nor2, _) => rises != output_rises,
         (CellKind::Buf | CellKind::And2 | CellKind::Or2, _) => rises == output_rises,

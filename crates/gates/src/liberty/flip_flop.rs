@@ -19,7 +19,7 @@ pub(super) const MAX_PINS: usize = 32;
 
 /// Pins of a flip-flop: indices of inputs, each with whether it is inverted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::netlist) struct FlipFlop {
+pub(crate) struct FlipFlop {
     pub data: (usize, bool),
     pub clock: (usize, bool),
     pub clear: Option<(usize, bool)>,

@@ -3,7 +3,7 @@
 mod flip_flops;
 
 use super::*;
-use crate::netlist::liberty::Liberty;
+use crate::liberty::Liberty;
 
 /// Tables over the load: a larger cell is stronger.
 fn arc(related: &str, more: &str, area: f64) -> String {

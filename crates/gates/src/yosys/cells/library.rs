@@ -1,9 +1,9 @@
 //! Cells of a Liberty file, as `abc -liberty` and `dfflibmap` place them, by what the file says that they do.
 
 use super::{Given, Placing, YosysError};
+use crate::liberty::{CellFunction, Role, TruthTable};
 use crate::netlist::CellKind::{And2, Buf, Inv, Mux2, Nand2, Nor2, Or2, Xnor2, Xor2};
 use crate::netlist::Net;
-use crate::netlist::liberty::{CellFunction, Role, TruthTable};
 
 /// Places what has the function of a library's cell.
 pub(super) fn place(

@@ -14,8 +14,8 @@
 use super::super::cell::{Candidate, CellModel, Role};
 use super::super::error::LibertyError;
 use super::{Maker, Source, Stage, gate_function, order};
+use crate::liberty::function::TruthTable;
 use crate::netlist::CellKind;
-use crate::netlist::liberty::function::TruthTable;
 
 impl Maker<'_, '_> {
     /// A candidate's tables, read once; none, with a reason for the user, of a cell that lacks something.

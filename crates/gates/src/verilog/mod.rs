@@ -16,7 +16,7 @@ pub use modules::write_modules;
 pub use standard_cells::write_standard_cells;
 pub(super) use standard_cells::{DFFSR_STATE, HEAD};
 
-use super::cell::CellKind;
+use crate::netlist::CellKind;
 
 const TIMESCALE: &str = "`timescale 1fs/1fs\n";
 

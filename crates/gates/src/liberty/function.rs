@@ -5,7 +5,7 @@
 
 /// The values of a function of up to six inputs: bit i is that for inputs whose bits make i, the first input the lowest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::netlist) struct TruthTable {
+pub(crate) struct TruthTable {
     pub inputs: u32,
     pub bits: u64,
 }
@@ -29,14 +29,14 @@ impl TruthTable {
     }
 
     /// The function where an input is 0, and where it is 1.
-    pub(in crate::netlist) fn cofactors(self, input: usize) -> [Self; 2] {
+    pub(crate) fn cofactors(self, input: usize) -> [Self; 2] {
         [0, 1].map(|value| {
             TruthTable::of(self.inputs, |i| self.at(i & !(1 << input) | value << input))
         })
     }
 
     /// The value of a function that has only one.
-    pub(in crate::netlist) fn constant(self) -> Option<bool> {
+    pub(crate) fn constant(self) -> Option<bool> {
         [false, true]
             .into_iter()
             .find(|&value| self == TruthTable::of(self.inputs, |_| value))
@@ -48,7 +48,7 @@ impl TruthTable {
     }
 
     /// The inverse function.
-    pub(in crate::netlist) fn inverted(self) -> Self {
+    pub(crate) fn inverted(self) -> Self {
         TruthTable {
             bits: !self.bits & Self::mask(self.inputs),
             ..self
@@ -67,7 +67,7 @@ impl TruthTable {
     }
 
     /// The function as one of `names`, if it is nothing but that input: its index, and whether it is inverted.
-    pub(in crate::netlist) fn literal(self) -> Option<(usize, bool)> {
+    pub(crate) fn literal(self) -> Option<(usize, bool)> {
         (0..self.inputs as usize).find_map(|input| {
             let same = TruthTable::of(self.inputs, |i| i >> input & 1 == 1);
             let mask = Self::mask(self.inputs);

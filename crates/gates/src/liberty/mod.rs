@@ -57,10 +57,10 @@ mod text;
 mod units;
 mod verilog_name;
 
-pub(in crate::netlist) use cell::{CellFunction, Role};
+pub(crate) use cell::{CellFunction, Role};
 pub use characterised::{Characterised, Environment};
 pub use error::{KitError, LibertyError};
-pub(in crate::netlist) use function::TruthTable;
+pub(crate) use function::TruthTable;
 pub use mapped_models::write_mapped_cells;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};
 pub use mapped_verilog::write_mapped;

@@ -4,16 +4,12 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 
 use super::limits::checks_of;
-use super::{Edge, PinEdge, SdfCheck, Triple, join};
+use super::{PinEdge, SdfCheck, Triple, join};
 use crate::Origin;
-use crate::netlist::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
-use crate::netlist::chain::Chain;
-use crate::netlist::corner::Corner;
-use crate::netlist::flat::Netlist;
-use crate::netlist::instance_limits::InstanceLimits;
-use crate::netlist::library::Library;
-use crate::netlist::module::{Cell, Module};
-use crate::netlist::{ArcDelay, CellDelays, Timing};
+use crate::netlist::{
+    ArcDelay, Cell, CellDelays, CellKind, Chain, Corner, Edge, InstanceLimits, Library, MAX_INPUTS,
+    MAX_OUTPUTS, Module, Netlist, Timing,
+};
 
 /// What stands between the names of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -206,7 +202,7 @@ fn body(
             continue;
         }
         let from = pin_edge(&PinEdge {
-            edge: (kind.is_flip_flop() && pin == 1).then_some(Edge::Rising),
+            edge: (kind.is_flip_flop() && pin == 1).then_some(Edge::Rise),
             pin: (*name).into(),
         });
         for (number, output) in kind.outputs().iter().enumerate() {
@@ -238,8 +234,8 @@ fn check_entry(check: &SdfCheck<'_>, timescale: SdfTimescale) -> String {
 fn pin_edge(pin: &PinEdge<'_>) -> String {
     match pin.edge {
         None => pin.pin.to_string(),
-        Some(Edge::Rising) => format!("(posedge {})", pin.pin),
-        Some(Edge::Falling) => format!("(negedge {})", pin.pin),
+        Some(Edge::Rise) => format!("(posedge {})", pin.pin),
+        Some(Edge::Fall) => format!("(negedge {})", pin.pin),
     }
 }
 
