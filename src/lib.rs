@@ -58,5 +58,6 @@ pub use guided_dtof_light::{
     files, guide, numerics, photon, scene, settings, stereo, theory, units,
 };
 pub use guided_dtof_sensor::{
-    analysis, chip, engine, kernel, liberty, logic, netlist, ranging, sdf, stimulus, verilog, waves,
+    ORIGIN, analysis, chip, engine, kernel, liberty, logic, netlist, ranging, sdf, stimulus,
+    verilog, waves,
 };

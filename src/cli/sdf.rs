@@ -8,6 +8,7 @@ use indicatif::DecimalBytes;
 
 use super::SensorArgs;
 use super::voice::{note, progress, tell};
+use crate::ORIGIN;
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::{Corner, Netlist, Timing};
@@ -67,6 +68,7 @@ pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
             Timescale::Fs => SdfTimescale::Fs,
             Timescale::Ps => SdfTimescale::Ps,
         },
+        origin: ORIGIN,
     };
     let design = args.sensor.chip();
     let bytes = size(&config, design, options)?;

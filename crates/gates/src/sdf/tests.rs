@@ -441,6 +441,7 @@ proptest! {
         let options = SdfOptions {
             divider: if slash { SdfDivider::Slash } else { SdfDivider::Dot },
             timescale: if fs { SdfTimescale::Fs } else { SdfTimescale::Ps },
+            ..SdfOptions::default()
         };
         let [min, typ, max] = [0, 1, 2].map(|skip| {
             let shifted: Vec<u32> = values.iter().map(|v| v.wrapping_mul(skip * 2 + 1)).collect();

@@ -49,6 +49,8 @@ pub struct SdfOptions {
     pub divider: SdfDivider,
     /// Unit of numbers.
     pub timescale: SdfTimescale,
+    /// The program that the file names as its writer.
+    pub origin: Origin,
 }
 
 /// Writes every cell of `netlist` with its delays and timing checks in the three corners (fast, typical, slow).
@@ -134,7 +136,7 @@ fn write_head(out: &mut dyn Write, design: &str, options: SdfOptions) -> io::Res
     };
     let Origin {
         program, version, ..
-    } = Origin::of_files();
+    } = options.origin;
     write!(
         out,
         "(DELAYFILE\n  (SDFVERSION \"3.0\")\n  (DESIGN \"{design}\")\n  (PROGRAM \"{program}\")\n  (VERSION \"{version}\")\n  (DIVIDER {divider})\n  (TIMESCALE 1{unit})\n"

@@ -34,10 +34,23 @@ impl<W: Read + Write + Seek> FstWriter<W> {
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
     pub fn new(out: W, netlist: &Netlist, selection: &Selection) -> io::Result<Self> {
+        Self::with_origin(out, netlist, selection, Origin::default())
+    }
+
+    /// The same, with another program named as the file's writer.
+    ///
+    /// # Errors
+    /// As [`FstWriter::new`].
+    pub fn with_origin(
+        out: W,
+        netlist: &Netlist,
+        selection: &Selection,
+        origin: Origin,
+    ) -> io::Result<Self> {
         let info = FstInfo {
             start_time: 0,
             timescale_exponent: -15,
-            version: Origin::of_files().vendor_and_version(),
+            version: origin.vendor_and_version(),
             date: String::new(),
             file_type: FstFileType::Verilog,
         };

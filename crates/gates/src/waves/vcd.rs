@@ -31,8 +31,21 @@ impl<W: Write> VcdWriter<W> {
     ///
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
-    pub fn new(mut out: W, netlist: &Netlist, selection: &Selection) -> io::Result<Self> {
-        let (variables, lines) = write_header(&mut out, netlist, selection)?;
+    pub fn new(out: W, netlist: &Netlist, selection: &Selection) -> io::Result<Self> {
+        Self::with_origin(out, netlist, selection, Origin::default())
+    }
+
+    /// The same, with another program named as the file's writer.
+    ///
+    /// # Errors
+    /// As [`VcdWriter::new`].
+    pub fn with_origin(
+        mut out: W,
+        netlist: &Netlist,
+        selection: &Selection,
+        origin: Origin,
+    ) -> io::Result<Self> {
+        let (variables, lines) = write_header(&mut out, netlist, selection, origin)?;
         let vcd = Vcd {
             out,
             error: None,
@@ -49,14 +62,13 @@ fn write_header(
     out: &mut impl Write,
     netlist: &Netlist,
     selection: &Selection,
+    origin: Origin,
 ) -> io::Result<(Variables, Vec<Line>)> {
     let mut header = Header {
         out: vcd::Writer::new(BufWriter::with_capacity(BLOCK, out)),
         lines: Vec::new(),
     };
-    header
-        .out
-        .version(&Origin::of_files().vendor_and_version())?;
+    header.out.version(&origin.vendor_and_version())?;
     header.out.timescale(1, TimescaleUnit::FS)?;
     let variables = Variables::declare(netlist, selection, &mut header)?;
     header.out.enddefinitions()?;

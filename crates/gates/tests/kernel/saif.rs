@@ -261,6 +261,14 @@ pub fn compare(
 /// What it says of a run.
 pub fn saif(netlist: &Netlist, activity: &Activity, end: Time) -> String {
     let mut text = Vec::new();
-    write_saif(&mut text, netlist, &activity.until(end), end, true).unwrap();
+    write_saif(
+        &mut text,
+        netlist,
+        &activity.until(end),
+        end,
+        true,
+        femtogate::Origin::default(),
+    )
+    .unwrap();
     String::from_utf8(text).unwrap()
 }
