@@ -30,7 +30,7 @@ fn main() -> Result<(), NetlistError> {
     m.gate_into(CellKind::Buf, &[joined], event);
     let netlist = Netlist::elaborate(&m.finish()?);
 
-    let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+    let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
     let spads = netlist.signal("SPAD_RAW").expect("it was built above");
     let event = netlist.net("EVENT").expect("it was built above");
     for apart_ps in [50, 100, 200, 400] {

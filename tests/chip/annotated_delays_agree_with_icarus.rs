@@ -39,7 +39,7 @@ fn compare(seed: u64, sdf: impl FnOnce(&Netlist, &Timing, &mut StdRng) -> String
     let pulses = [&pulses[..]];
 
     let netlist = Netlist::elaborate(&array::circuit(&config));
-    let nominal = Timing::nominal(&netlist, &Library::default(), config.corner);
+    let nominal = Timing::nominal(&netlist, &Library::generic_40nm(), config.corner);
     let text = sdf(&netlist, &nominal, random);
     let sdf = Sdf::parse("chip.sdf", &text).unwrap();
     let mut timing = nominal;

@@ -42,7 +42,7 @@ impl Bench {
     }
 
     pub fn delay(&self, kind: CellKind, pin: usize, to: Logic) -> Time {
-        Library::default().delay(kind, pin, to, self.config.corner)
+        Library::generic_40nm().delay(kind, pin, to, self.config.corner)
     }
 
     pub fn net(&self, path: &str) -> NetId {
@@ -76,7 +76,7 @@ impl Bench {
             recorder: Recorder::new(nets),
             kernel: Kernel::new(
                 &self.netlist,
-                &Timing::nominal(&self.netlist, &Library::default(), self.config.corner),
+                &Timing::nominal(&self.netlist, &Library::generic_40nm(), self.config.corner),
             ),
             stimulus: Stimulus::sorted(std::mem::take(&mut self.drives)),
         }

@@ -394,7 +394,7 @@ fn correlate(
     let starts: Vec<_> = starts
         .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)))
         .collect();
-    let timing = Timing::nominal(&netlist, &Library::default(), corner);
+    let timing = Timing::nominal(&netlist, &Library::generic_40nm(), corner);
     let arrivals = StaticTiming::new(&netlist, &timing)
         .arrivals(&starts, &[])
         .unwrap();
@@ -425,7 +425,7 @@ fn the_correlation_block_counts_every_pattern_of_spads() {
 fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold() {
     const THRESHOLDS: u8 = 18;
     let netlist = Netlist::elaborate(&correlation::circuit(16));
-    let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+    let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
     let bus = |path: &str| netlist.signal(path).unwrap();
     let (timed, code, threshold) = (bus("SPAD_TIMED"), bus("TYPE"), bus("THRESHOLD"));
     let event = netlist.net("SPAD_EVENT").unwrap();

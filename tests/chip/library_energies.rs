@@ -21,8 +21,8 @@ fn of_a_chain_by_opensta() {
             net = m.gate(CellKind::Inv, &[net]);
         }
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let environment = Environment::of(&library);
-        let made = Characterised::of(&netlist, &library, &environment);
+        let environment = Environment::new(&library);
+        let made = Characterised::new(&netlist, &library, &environment);
         let folder = tempfile::tempdir().unwrap();
         let mut verilog = Vec::new();
         write_mapped(&mut verilog, &netlist, &library, &made).unwrap();

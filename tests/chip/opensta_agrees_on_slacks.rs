@@ -220,7 +220,7 @@ fn ours(mapped: &Mapped) -> Checks {
     };
     let block = &Probe::Block.path("");
     let clk = |edge| after("CLK", edge, &["HIT", block, "ENABLE"]);
-    let no_limits = derated_limits(&Library::default(), 0.0);
+    let no_limits = derated_limits(&Library::generic_40nm(), 0.0);
     let all = Requirements::behind(netlist, Edge::BOTH.map(clk), &no_limits, Corner::Typ);
     let launches = [Launch::ClkRise, Launch::ClkFall];
     let mut checks = Checks::new();

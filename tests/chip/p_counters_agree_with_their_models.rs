@@ -170,7 +170,7 @@ proptest! {
 fn the_ripple_is_the_sum_of_its_stages() {
     use guided_dtof::netlist::Library;
     for corner in Corner::ALL {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let delay = |kind, pin| library.delay(kind, pin, One, corner);
         let (custom, library_cell) = (delay(CellKind::Dffr, 1), delay(CellKind::Dffsr, 1));
         let (mux, buffer) = (delay(CellKind::Mux2, 0), delay(CellKind::Buf, 0));

@@ -120,7 +120,7 @@ fn delays_are_written_without_elaborating_the_design() {
             cols: 3,
             ..(*sensor).clone()
         };
-        let (top, library) = (array::circuit(&config), Library::default());
+        let (top, library) = (array::circuit(&config), Library::generic_40nm());
         let netlist = Netlist::elaborate(&top);
         let corners = Corner::ALL.map(|corner| Timing::nominal(&netlist, &library, corner));
         let options = SdfOptions::default();
@@ -195,7 +195,7 @@ endmodule
 
 /// Both models of every cell in the typical corner: files standard.v and exact.v.
 fn write_both_models(folder: &Path) {
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let mut text = Vec::new();
     write_standard_cells(&mut text, &library, &BTreeSet::new()).unwrap();
     fs::write(folder.join("standard.v"), &text).unwrap();

@@ -126,7 +126,7 @@ proptest! {
         words in prop::collection::vec(0u64..128, 1..12),
     ) {
         let netlist = Netlist::elaborate(&random_circuit(&choices));
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let mut next = delays.iter().cycle();
         for cell in 0..netlist.cells().len() {
             let mut arc = || {
@@ -154,7 +154,7 @@ proptest! {
             _ => p_counter::circuit(&sensor(PCounter::ALL[block - 6], 9)),
         };
         let netlist = Netlist::elaborate(&circuit);
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         check(&netlist, &timing, &words, u64::MAX)?;
     }
 
@@ -166,7 +166,7 @@ proptest! {
     ) {
         prop_assume!(p_counter.row().has_memory);
         let netlist = Netlist::elaborate(&p_counter::circuit(&sensor(p_counter, bits)));
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let net = |name| netlist.net(name).unwrap();
         let (clk, stop) = (net("COUNTER_CLK"), net("LOCAL_STOP"));
         let analysis = StaticTiming::new(&netlist, &timing);

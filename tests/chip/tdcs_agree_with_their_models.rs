@@ -26,7 +26,7 @@ struct Converter {
 impl Converter {
     fn new(module: &Arc<Module>, corner: Corner, mismatch_seed: u64) -> Self {
         let netlist = Netlist::elaborate(module);
-        let nominal = Timing::nominal(&netlist, &Library::default(), corner);
+        let nominal = Timing::nominal(&netlist, &Library::generic_40nm(), corner);
         let mismatch = Mismatch {
             sigma: 0.2,
             seed: mismatch_seed,

@@ -48,7 +48,7 @@ fn there_and_back(module: &Arc<Module>) -> Option<(Arc<Module>, String)> {
     let folder = tempfile::tempdir().unwrap();
     let mut verilog = Vec::new();
     write_modules(&mut verilog, module).unwrap();
-    write_standard_cells(&mut verilog, &Library::default(), &BTreeSet::new()).unwrap();
+    write_standard_cells(&mut verilog, &Library::generic_40nm(), &BTreeSet::new()).unwrap();
     std::fs::write(folder.path().join("block.v"), verilog).unwrap();
     let json = synthesised(folder.path(), module.name(), "")?;
     let read = Module::from_yosys(&json, None).unwrap();

@@ -49,7 +49,7 @@ impl Bench {
         }
         let netlist = Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"));
         Bench {
-            timing: Timing::nominal(&netlist, &Library::default(), Corner::Typ),
+            timing: Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ),
             config: config(FrontEnd::OrTree),
             netlist,
         }

@@ -233,7 +233,7 @@ mod tests {
             };
             (glitches(a), glitches(z))
         };
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         assert_eq!(run(&timing), ((20, [0, 0]), (20, [20, 0])));
         // The gate slower than the chain.
         let nand = netlist

@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn the_delay_is_that_of_the_pin_that_changed() {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let mut m = ModuleBuilder::new("m");
         let (a, b, s) = (m.input("A"), m.input("B"), m.input("S"));
         m.gate(CellKind::Mux2, &[a, b, s]);

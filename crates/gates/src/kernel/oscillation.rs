@@ -33,7 +33,7 @@ mod tests {
         let (a, z) = (m.input("A"), m.output("Z"));
         m.gate_into(CellKind::Nand2, &[a, z], z);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let nothing = ArcDelay {
             rise_fs: 0,
             fall_fs: 0,

@@ -192,7 +192,7 @@ mod tests {
             m.gate(CellKind::Inv, &[q[odd]]);
         }
         let netlist = Netlist::elaborate(&m.finish().expect("a register"));
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         if own == Own::Wire {
             timing.set_model(odd, DelayModel::Transport);
         }

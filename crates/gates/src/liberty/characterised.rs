@@ -34,7 +34,7 @@ pub struct Environment {
 impl Environment {
     /// Slews by the library's smallest inverter: inputs as if it drove four of its kind, drives as if it drove eight. Wires are
     /// left out, as before layout.
-    pub fn of(library: &Liberty) -> Self {
+    pub fn new(library: &Liberty) -> Self {
         let inverter = &library.map.recipe(CellKind::Inv).stages[0].drives[0];
         Environment {
             input_slew_fs: inverter.settled_slew(4.0),
@@ -88,10 +88,17 @@ impl Nets {
 }
 
 impl Liberty {
+    /// Delays and limits of every cell of a netlist in this library's cells, by its load and the slews at its pins; cells with delays
+    /// of their own keep these, as they are in the typical corner. Inputs have the slew of [`Environment::new`], and wires are left out.
+    pub fn timing(&self, netlist: &Netlist) -> Timing {
+        let timing = Characterised::new(netlist, self, &Environment::new(self)).timing;
+        timing.with_own_delays(netlist, Corner::Typ, |cell| netlist.cell_path(cell))
+    }
+
     /// Delays and limits of each kind by itself, the same in every corner: with the environment's slew at every pin and four of the smallest
     /// inverters on each output.
     pub fn nominal(&self, environment: &Environment) -> Library {
-        let mut library = Library::default();
+        let mut library = Library::generic_40nm();
         let inverter = &self.map.recipe(CellKind::Inv).stages[0].drives[0];
         let load = inverter.inputs[0].load_ff.map(|load| 4.0 * load);
         let drives = [0; MOST_STAGES];
@@ -120,13 +127,13 @@ impl Characterised {
     /// Sizes and times a netlist. Nets without a driver have the environment's slew. A net that the library's strongest buffer is
     /// too weak for loads its driver with no more than that buffer could drive: such nets get trees of buffers in layout, which are no part
     /// of a netlist.
-    pub fn of(netlist: &Netlist, library: &Liberty, environment: &Environment) -> Self {
-        Self::by_blocks(netlist, library, environment, |_| false)
+    pub fn new(netlist: &Netlist, library: &Liberty, environment: &Environment) -> Self {
+        Self::with_blocks(netlist, library, environment, |_| false)
     }
 
     /// The same where each instance of the modules that are blocks is sized and timed alone, as blocks are that are laid out once:
     /// the environment's slew comes to its inputs, and its outputs drive nothing outside.
-    pub fn by_blocks(
+    pub fn with_blocks(
         netlist: &Netlist,
         library: &Liberty,
         environment: &Environment,
@@ -142,7 +149,7 @@ impl Characterised {
             }
             let alone = known.entry(Arc::as_ptr(&at.module)).or_insert_with(|| {
                 let alone = Netlist::elaborate(&at.module);
-                let characterised = Self::of(&alone, library, environment);
+                let characterised = Self::new(&alone, library, environment);
                 Arc::new((alone, characterised))
             });
             let first = netlist.cells_of(scope).start;
@@ -424,7 +431,7 @@ impl<'w> Work<'w> {
     }
 
     fn finish(self) -> Characterised {
-        let mut timing = Timing::of_library(self.netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::of_library(self.netlist, &Library::generic_40nm(), Corner::Typ);
         let mut adopted = HashMap::new();
         for block in &self.blocks {
             let alone = &block.alone.1;

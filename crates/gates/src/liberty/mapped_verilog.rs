@@ -17,7 +17,7 @@ const HEAD: &str = "\
 /* verilator lint_off DECLFILENAME */
 ";
 
-/// Writes a netlist in the cells and drives that [`Characterised::of`] chose, as a module of its top's name.
+/// Writes a netlist in the cells and drives that [`Characterised::new`] chose, as a module of its top's name.
 ///
 /// # Errors
 /// Those of the writer.

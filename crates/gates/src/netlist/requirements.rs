@@ -246,7 +246,7 @@ mod tests {
 
     /// Longest need of one check of the second flip-flop, with its half periods.
     fn need(inverted: bool, kind: CheckKind) -> (i64, Time) {
-        let (netlist, library) = (pair(inverted), Library::default());
+        let (netlist, library) = (pair(inverted), Library::generic_40nm());
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn data_have_a_period_to_the_same_edge_and_half_of_one_to_the_opposite() {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let delay = |kind, pin, to| library.delay(kind, pin, to, Corner::Typ);
         let clock_to_q = delay(CellKind::Dffr, 1, Logic::One);
         let (rise, fall) = (
@@ -288,7 +288,10 @@ mod tests {
         let (ck, r, q) = (m.input("CK"), m.input("R"), m.output("Q"));
         let qn = m.wire("QN");
         m.cell("bit", CellKind::Dffr, &[qn, ck, r], &[q, qn]);
-        let (netlist, library) = (Netlist::elaborate(&m.finish().unwrap()), Library::default());
+        let (netlist, library) = (
+            Netlist::elaborate(&m.finish().unwrap()),
+            Library::generic_40nm(),
+        );
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();

@@ -383,7 +383,7 @@ mod tests {
         for _ in 0..4 {
             net = m.gate(CellKind::Inv, &[net]);
         }
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);
@@ -406,7 +406,7 @@ mod tests {
         let inner = m.gate(CellKind::Nand2, &[a, z]);
         m.gate_into(CellKind::Inv, &[inner], z);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);
         let (a, z) = (netlist.net("A").unwrap(), netlist.net("Z").unwrap());
         assert!(analysis.arrivals(&[(a, Edge::Rise)], &[]).is_err());
@@ -421,7 +421,7 @@ mod tests {
         let q = m.output("Q");
         m.cell("ff", CellKind::Dffr, &[d, ck, r], &[Some(q), None]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);
         let net = |name| netlist.net(name).unwrap();
         let after = |name, edge| {

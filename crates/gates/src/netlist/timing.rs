@@ -187,7 +187,7 @@ mod tests {
         let b = m.gate(CellKind::Inv, &[a]);
         m.gate(CellKind::Inv, &[b]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let nominal = *timing.of(0);
         let slow = [[ArcDelay {
             rise_fs: 9,

@@ -193,7 +193,7 @@ mod tests {
         let q = m.output("Q");
         m.cell("flip_flop", CellKind::Dffr, &pins, &[Some(q), None]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let of = |library: &Library| Timing::nominal(&netlist, library, Corner::Typ);
         let (slow, derated) = (
             varied(&netlist, &of(&library), 1.5, None),

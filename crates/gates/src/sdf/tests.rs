@@ -33,7 +33,7 @@ pub(super) fn design() -> Netlist {
 }
 
 pub(super) fn nominal(netlist: &Netlist, corner: Corner) -> Timing {
-    Timing::nominal(netlist, &Library::default(), corner)
+    Timing::nominal(netlist, &Library::generic_40nm(), corner)
 }
 
 /// Compares the pins that cells have.
@@ -170,7 +170,7 @@ fn stages_of_a_chain_add_up_to_its_cell() {
     let (a, z) = (m.input("A"), m.output("Z"));
     m.cell_with_delay("line", CellKind::Buf, &[a], &[z], OwnDelay::wire(2_600_001));
     let netlist = Netlist::elaborate(&m.finish().unwrap());
-    let nominal = |corner| Timing::nominal(&netlist, &Library::default(), corner);
+    let nominal = |corner| Timing::nominal(&netlist, &Library::generic_40nm(), corner);
     let delay = |body: &str| {
         let mut timing = nominal(Corner::Typ);
         let text = file(body);

@@ -315,7 +315,7 @@ mod tests {
     fn a_simulator_alone_is_told_widths() {
         let checks = |reader| {
             let mut text = Vec::new();
-            write_specify(&mut text, CellKind::Dffr, &Library::default(), reader).unwrap();
+            write_specify(&mut text, CellKind::Dffr, &Library::generic_40nm(), reader).unwrap();
             let text = String::from_utf8(text).unwrap();
             ["$width", "$setuphold", "$recrem"].map(|check| text.matches(check).count())
         };

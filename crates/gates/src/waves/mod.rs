@@ -22,7 +22,7 @@
 //! let netlist = Netlist::elaborate(&m.finish().unwrap());
 //!
 //! let mut waves = VcdWriter::new(Vec::new(), &netlist, &Selection::all())?;
-//! let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+//! let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
 //! let mut kernel = Kernel::new(&netlist, &timing);
 //! let drives = [Drive::new(Time::from_ns(1), netlist.net("A").unwrap(), true)];
 //! let mut stimulus = Stimulus::new(drives);

@@ -41,7 +41,7 @@ impl Bench {
     fn of(text: &str, library: Option<&Liberty>) -> Self {
         let module = Module::from_yosys_of(text, None, library).unwrap();
         let netlist = Netlist::elaborate(&module);
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let kernel = Kernel::new(&netlist, &timing);
         Bench { netlist, kernel }
     }

@@ -35,8 +35,8 @@ fn alone(library: &Liberty, kind: CellKind) -> (Netlist, Characterised, f64) {
     let z = m.output("Z");
     m.gate_into(kind, &inputs, z);
     let netlist = Netlist::elaborate(&m.finish().unwrap());
-    let environment = Environment::of(library);
-    let made = Characterised::of(&netlist, library, &environment);
+    let environment = Environment::new(library);
+    let made = Characterised::new(&netlist, library, &environment);
     (netlist, made, environment.input_slew_fs * 1e-6)
 }
 
@@ -112,9 +112,9 @@ fn limits_of_a_flip_flop() {
     let unused = m.wire("QN");
     m.cell("flip_flop", CellKind::Dffr, &[d, ck, r], &[q, unused]);
     let netlist = Netlist::elaborate(&m.finish().unwrap());
-    let environment = Environment::of(&library);
+    let environment = Environment::new(&library);
     let slew = environment.input_slew_fs * 1e-6;
-    let made = Characterised::of(&netlist, &library, &environment);
+    let made = Characterised::new(&netlist, &library, &environment);
     let limits = made.timing.limits(0, CellKind::Dffr);
     let limit = |kind, edge| limits.at(Control::Reset, kind, edge);
     for (kind, [rise_fs, fall_fs]) in [
@@ -156,8 +156,8 @@ fn energies_of_two_inverters() {
         let z = m.output("Z");
         m.gate_into(CellKind::Inv, &[between], z);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let environment = Environment::of(library);
-        let made = Characterised::of(&netlist, library, &environment);
+        let environment = Environment::new(library);
+        let made = Characterised::new(&netlist, library, &environment);
         let [within, loads] = made.energy_j((&netlist, 0), library, 2.0, |_| 10.0);
         (within, loads, environment.input_slew_fs * 1e-6)
     };

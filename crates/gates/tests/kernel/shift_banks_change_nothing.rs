@@ -59,7 +59,7 @@ proptest! {
         steps in prop::collection::vec((0u16..400, 0u8..100, 5_000i64..200_000), 20..600),
     ) {
         let netlist = Netlist::elaborate(&register(stages, watched));
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let nets = ["D", "CK", "R", "OTHER"].map(|name| netlist.net(name).unwrap());
         let mut drives: Vec<Drive> = nets.map(|n| Drive::new(Time::ZERO, n, false)).into();
         drives.push(Drive::new(Time::from_ps(1), nets[2], true));
@@ -90,7 +90,7 @@ proptest! {
         prop_assert_eq!(trace(&netlist, &timing, drives.clone(), None), apart);
         // Where a gate watches every output there is no bank at all, and the register's nets, which come first, do the same.
         let watched = Netlist::elaborate(&register(stages, 0..stages));
-        let timing_of_watched = Timing::nominal(&watched, &Library::default(), Corner::Typ);
+        let timing_of_watched = Timing::nominal(&watched, &Library::generic_40nm(), Corner::Typ);
         let here = changes(&netlist, &timing, drives.clone());
         let mut there = changes(&watched, &timing_of_watched, drives);
         let of_register = 4 + 2 * stages;

@@ -133,7 +133,7 @@ fn every_check_is_exact_to_the_femtosecond() {
 
 /// One kind of check at its limit and a femtosecond beside it.
 fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str, Edge)) {
-    let (library, netlist) = (Library::default(), pair(kind));
+    let (library, netlist) = (Library::generic_40nm(), pair(kind));
     let limit = i64::from(library.checks(kind).toward(check, varied.1, corner));
     for slack in [1 - limit, -5_000, -1, 0, 1, 5_000] {
         let steps = script(kind, check, varied, limit + slack);
@@ -163,7 +163,7 @@ fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str
 #[test]
 fn each_control_is_judged_by_its_own_limit() {
     let (kind, corner) = (CellKind::Dffsr, Corner::Typ);
-    let (library, netlist) = (Library::default(), pair(kind));
+    let (library, netlist) = (Library::generic_40nm(), pair(kind));
     let mut timing = Timing::nominal(&netlist, &library, corner);
     let text = "(DELAYFILE (SDFVERSION \"3.0\") (TIMESCALE 1fs)
         (CELL (CELLTYPE \"DFFSR\") (INSTANCE first) (TIMINGCHECK
@@ -191,7 +191,7 @@ fn each_control_is_judged_by_its_own_limit() {
 
 #[test]
 fn a_pulse_on_d_is_judged_at_both_its_edges() {
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let limits = library.checks(CellKind::Dffr);
     let [rise, fall] =
         Edge::BOTH.map(|e| i64::from(limits.toward(CheckKind::Setup, e, Corner::Typ)));
@@ -207,7 +207,7 @@ fn a_pulse_on_d_is_judged_at_both_its_edges() {
 }
 
 fn kinds(steps: &[(i64, &'static str, Logic)]) -> Vec<(CheckKind, i64)> {
-    let (library, kind) = (Library::default(), CellKind::Dffr);
+    let (library, kind) = (Library::generic_40nm(), CellKind::Dffr);
     let steps = after_reset(kind, steps);
     let policy = Policy::ReportOnly;
     let (report, ..) = simulate(&pair(kind), &library, Corner::Typ, policy, &steps);
@@ -217,7 +217,7 @@ fn kinds(steps: &[(i64, &'static str, Logic)]) -> Vec<(CheckKind, i64)> {
 
 /// The limit for a rising D.
 fn limit(check: CheckKind) -> i64 {
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let limits = library.checks(CellKind::Dffr);
     limits.toward(check, Edge::Rise, Corner::Typ).into()
 }
@@ -271,7 +271,7 @@ fn a_held_flip_flop_is_not_judged() {
 
 #[test]
 fn nothing_is_judged_before_its_time_but_earlier_events_are_remembered() {
-    let (library, netlist) = (Library::default(), pair(CellKind::Dffr));
+    let (library, netlist) = (Library::generic_40nm(), pair(CellKind::Dffr));
     let run = |not_before: i64| {
         let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ)
             .not_before(Time::from_fs(not_before));
@@ -298,7 +298,7 @@ fn nothing_is_judged_before_its_time_but_earlier_events_are_remembered() {
 
 #[test]
 fn a_violation_makes_the_state_unknown_downstream_until_a_reset() {
-    let (library, kind) = (Library::default(), CellKind::Dffr);
+    let (library, kind) = (Library::generic_40nm(), CellKind::Dffr);
     let netlist = pair(kind);
     let steps = after_reset(
         kind,
@@ -343,7 +343,7 @@ fn a_violation_makes_the_state_unknown_downstream_until_a_reset() {
 #[test]
 fn a_report_round_trips_through_json() {
     let steps = script(CellKind::Dffr, CheckKind::Hold, ("R", Edge::Rise), 4);
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let policy = Policy::ReportOnly;
     let (report, ..) = simulate(
         &pair(CellKind::Dffr),

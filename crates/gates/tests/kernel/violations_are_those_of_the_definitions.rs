@@ -259,7 +259,7 @@ proptest! {
     ) {
         let kind = if has_set { CellKind::Dffsr } else { CellKind::Dffr };
         let policy = if spreads_x { Policy::XOnViolation } else { Policy::ReportOnly };
-        let mut library = Library::default();
+        let mut library = Library::generic_40nm();
         let limits = self::limits(limits);
         library.set_checks(kind, limits);
         let arc = |fs| [TimingArc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) }; 2];

@@ -241,7 +241,7 @@ mod tests {
         }
         let from = Time::from_ns(5);
         let mut activity = Activity::new(&netlist, from);
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let end = Time::from_ns(30);
         Kernel::new(&netlist, &timing)
             .run(&mut Stimulus::sorted(drives), end, &mut activity)

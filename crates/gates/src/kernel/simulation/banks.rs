@@ -168,7 +168,7 @@ mod tests {
             );
         }
         let netlist = Netlist::elaborate(&m.finish().expect("a register"));
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let mut kernel = Kernel::new(&netlist, &timing);
         let net = |name: &str| netlist.net(name).expect("a net");
         let mut now = Time::ZERO;
