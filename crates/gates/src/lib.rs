@@ -1,3 +1,5 @@
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
 #![cfg_attr(not(test), warn(unreachable_pub, clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 
