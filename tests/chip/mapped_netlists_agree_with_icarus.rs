@@ -7,7 +7,7 @@
 //!
 //! Where several cells of the library stand for one of ours the kernel has one delay, the sum, rounded to whole femtoseconds; Icarus rounds each.
 //! A ripple adds such differences up, so edges may be [`APART_FS`] apart. A pulse shorter than the sum, but not than each, comes through in Icarus alone;
-//! Icarus 11 mistakes some of three changes within one delay, too (`netlist/verilog/standard_cells`). The adders of the correlation are full of such pulses and are left
+//! Icarus 11 mistakes some of three changes within one delay, too (`verilog/standard_cells`). The adders of the correlation are full of such pulses and are left
 //! out: what CLK samples of them is compared in the METDC. Elsewhere a few are passed over and counted, and none on [`EXACT`].
 //!
 //! Chips: the QuantIC4x4 with every P-counter whose reset pulse is not more than 50 ps too short in the library (`gdtof timing` says by how much; removal times, which neither

@@ -3,6 +3,7 @@
 /// A fault of a Liberty file, with its line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
+#[non_exhaustive]
 pub struct LibertyError {
     /// Line, from 1.
     pub line: usize,
@@ -13,6 +14,7 @@ pub struct LibertyError {
 /// A fault of one of several Liberty files.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{fault}")]
+#[non_exhaustive]
 pub struct KitError {
     /// Which file, from 0.
     pub file: usize,

@@ -5,7 +5,7 @@
 //!   netlist ─► loads, drives, slews ────────────────┴─► characterised: Timing of every instance, area, leakage, mapped Verilog
 //! ```
 //!
-//! Each kind of cell ([`CellKind`](super::CellKind)) is mapped to cells of the library by its *function*. Then every instance gets delays of its
+//! Each kind of cell ([`CellKind`](crate::netlist::CellKind)) is mapped to cells of the library by its *function*. Then every instance gets delays of its
 //! own from the library's tables, by its load and by the slews at its pins. Non-linear delay models are read; current-source models
 //! in the same file are passed over.
 //!

@@ -74,6 +74,7 @@ pub fn caused(kind: CellKind, pin: usize, edge: Edge, output: usize) -> &'static
 /// Edges go round in a circle.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("edges come back to net {net}: name a net of the loop as a barrier")]
+#[non_exhaustive]
 pub struct TimingLoop {
     /// A net in or behind the loop.
     pub net: String,

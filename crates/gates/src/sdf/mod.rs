@@ -23,7 +23,7 @@
 //!
 //! # Chains
 //! A cell with transport delays is one cell of the netlist and a chain of stages for other tools
-//! ([`Chain`](super::Chain)): a file names the stages, whose delays are added up, or the cell.
+//! ([`Chain`](crate::netlist::Chain)): a file names the stages, whose delays are added up, or the cell.
 //!
 //! # Wires
 //! Wire delays (INTERCONNECT, PORT) are added to the arcs of the pin they end at. That gives every change of

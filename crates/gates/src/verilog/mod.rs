@@ -2,10 +2,10 @@
 //!
 //! | file | cells | for |
 //! |---|---|---|
-//! | [`exact_cells`] | every edge as the event kernel has it, also where events meet in one instant | differential tests in Icarus Verilog |
-//! | [`standard_cells`] | `specify` blocks, timing checks, notifiers; takes SDF | other simulators, linters, synthesis |
+//! | `exact_cells` | every edge as the event kernel has it, also where events meet in one instant | differential tests in Icarus Verilog |
+//! | `standard_cells` | `specify` blocks, timing checks, notifiers; takes SDF | other simulators, linters, synthesis |
 //!
-//! Both have the cells and pins that [`modules`] instantiates. Time unit and precision are one femtosecond.
+//! Both have the cells and pins that `modules` instantiates. Time unit and precision are one femtosecond.
 
 mod exact_cells;
 mod modules;

@@ -4,6 +4,7 @@ use crate::netlist::NetlistError;
 
 /// What is wrong with a netlist of Yosys, and the cure.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum YosysError {
     /// The text is no such netlist.
     #[error(
