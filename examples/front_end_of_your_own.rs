@@ -5,7 +5,7 @@
 //!
 //! `cargo run --release --example front_end_of_your_own`
 
-use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
 use guided_dtof::netlist::{
     CellKind, Corner, Library, ModuleBuilder, Netlist, NetlistError, Timing,
 };
@@ -30,7 +30,7 @@ fn main() -> Result<(), NetlistError> {
     m.gate_into(CellKind::Buf, &[joined], event);
     let netlist = Netlist::elaborate(&m.finish()?);
 
-    let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+    let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
     let spads = netlist.signal("SPAD_RAW").expect("it was built above");
     let event = netlist.net("EVENT").expect("it was built above");
     for apart_ps in [50, 100, 200, 400] {
@@ -46,7 +46,13 @@ fn main() -> Result<(), NetlistError> {
         }
         let mut kernel = Kernel::new(&netlist, &timing);
         let mut recorder = Recorder::new([event]);
-        kernel.run(&mut in_order(drives), Time::from_ns(30), &mut recorder);
+        kernel
+            .run(
+                &mut Stimulus::sorted(drives),
+                Time::from_ns(30),
+                &mut recorder,
+            )
+            .expect("no loop of cells without delay");
         let edges = recorder.rising_edges(event).len();
         println!("photons {apart_ps:3} ps apart: {edges} edge(s) on EVENT");
     }

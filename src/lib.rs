@@ -1,3 +1,4 @@
+#![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
     warn(
@@ -58,5 +59,6 @@ pub use guided_dtof_light::{
     files, guide, numerics, photon, scene, settings, stereo, theory, units,
 };
 pub use guided_dtof_sensor::{
-    analysis, chip, engine, kernel, logic, netlist, ranging, stimulus, waves,
+    ORIGIN, analysis, chip, engine, kernel, liberty, logic, netlist, ranging, sdf, stimulus,
+    verilog, waves,
 };

@@ -66,7 +66,6 @@ mod _gdtof {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        guided_dtof::request::sign_files();
         let reasons = NoDepth::ALL.map(NoDepth::name);
         module.add("REASONS", PyTuple::new(module.py(), reasons)?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -8,10 +8,10 @@ use super::SensorArgs;
 use super::voice::{note, notes, tell};
 use crate::chip::{CellLibrary, FromFile, Probes, SensorConfig, macropixel};
 use crate::files::{InputError, OutputFile, ResultSet};
-use crate::netlist::Netlist;
-use crate::netlist::liberty::{
+use crate::liberty::{
     Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
 };
+use crate::netlist::Netlist;
 
 /// Arguments of `gdtof export sdc`.
 #[derive(Args)]

@@ -44,7 +44,7 @@ pub use tb::testbench;
 use self::settings::{SceneArgs, SensorArgs};
 use crate::engine::EngineError;
 use crate::files::{InputError, clean_up_when_interrupted, guard_inputs, said_of_kept_files};
-use crate::request::{self, Spelling, sign_files};
+use crate::request::{self, Spelling};
 use crate::system::FrameError;
 
 /// Simulate a guided direct time-of-flight lidar chip, from the scene down to gates and flip-flops.
@@ -133,7 +133,6 @@ pub fn command_line() -> clap::Command {
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
-    sign_files();
     guard_inputs();
     if let Err(error) = clean_up_when_interrupted() {
         voice::note(format_args!(

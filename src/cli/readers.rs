@@ -13,13 +13,13 @@ use crate::files::{
     read_text, write_npy,
 };
 use crate::guide::options;
-use crate::netlist::liberty::Liberty;
-use crate::netlist::sdf::{Sdf, annotate, oddities};
+use crate::liberty::Liberty;
 use crate::netlist::{Module, Netlist, Timing};
 use crate::page::Page;
 use crate::ranging::{Calibration, tmf8820};
 use crate::request::read_calibration;
 use crate::scene::{Mesh, Scene};
+use crate::sdf::{Sdf, annotate, oddities};
 use crate::settings::Document;
 use crate::stimulus::recording::{read_events, read_starts};
 use crate::sweep::{Study, study_of};

@@ -13,6 +13,7 @@ use super::asked::WaveFormatOption;
 use super::sdf::annotated_timing;
 use super::settings::SiliconArgs;
 use super::voice::{aside, note, progress, say_json};
+use crate::ORIGIN;
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::{self, View};
@@ -298,7 +299,7 @@ fn watch(
     let end = simulation.now();
     OutputFile::write_with(saif, |out| {
         let nets = activity.until(end);
-        write_saif(out, &netlist, &nets, end, args.saif_glitches)
+        write_saif(out, &netlist, &nets, end, args.saif_glitches, ORIGIN)
     })
 }
 

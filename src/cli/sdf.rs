@@ -8,13 +8,14 @@ use indicatif::DecimalBytes;
 
 use super::SensorArgs;
 use super::voice::{note, progress, tell};
+use crate::ORIGIN;
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
-use crate::netlist::sdf::{
+use crate::netlist::{Corner, Netlist, Timing};
+use crate::sdf::{
     Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities,
     write_library_sdf, write_sdf,
 };
-use crate::netlist::{Corner, Netlist, Timing};
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Divider {
@@ -67,6 +68,7 @@ pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
             Timescale::Fs => SdfTimescale::Fs,
             Timescale::Ps => SdfTimescale::Ps,
         },
+        origin: ORIGIN,
     };
     let design = args.sensor.chip();
     let bytes = size(&config, design, options)?;

@@ -14,7 +14,6 @@ use super::voice::{complain, note, notes, progress, say_json, tell};
 use crate::chip::SensorConfig;
 use crate::files::{InputError, ResultSet, clean_up_when_interrupted, instead_of};
 use crate::report::{Checks, Grid};
-use crate::request::sign_files;
 use crate::testbenches::{TESTBENCHES, Testbench};
 use crate::waves::WaveFormat;
 
@@ -243,7 +242,6 @@ struct OneArgs {
 /// # Panics
 /// When there is no testbench of this name.
 pub fn testbench(name: &'static str) -> ExitCode {
-    sign_files();
     let testbench = Testbench::named(name).expect("a testbench for each tb_* binary");
     let command = OneArgs::command().name(name).about(testbench.about);
     let args = OneArgs::from_arg_matches(&command.get_matches());

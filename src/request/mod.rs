@@ -22,13 +22,3 @@ pub use self::sources::Sources;
 pub(crate) use self::sources::{ReadAs, refuse_other_kind};
 pub use self::spelling::Spelling;
 pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};
-
-/// From now on waveforms, their layouts, activity and delay files name this program as their writer.
-pub fn sign_files() {
-    let origin = guided_dtof_sensor::Origin {
-        vendor: "guided-dtof",
-        program: "gdtof",
-        version: env!("CARGO_PKG_VERSION"),
-    };
-    origin.sign_files();
-}

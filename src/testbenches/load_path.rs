@@ -13,7 +13,7 @@ use crate::chip::{CellLibrary, LoadPins, LoadProbe, Probe, SensorConfig, load_pa
 use crate::engine::load::{load, load_netlist};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Recorder, in_order};
+use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
 use crate::logic::Logic::{One, X, Zero};
 use crate::netlist::{CellKind, NetId, Netlist, Timing};
 use crate::report::Checks;
@@ -181,18 +181,20 @@ fn small_array(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         &bench.netlist,
         &Timing::nominal(&bench.netlist, CellLibrary::BUILT_IN.cells(), config.corner),
     );
-    let mut stimulus = in_order(std::mem::take(&mut bench.drives));
+    let mut stimulus = Stimulus::sorted(std::mem::take(&mut bench.drives));
     let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
     let mut found = Vec::new();
     let view = view(&config, spans[0]);
     write_waves(waves, &bench.netlist, &view, |waves| {
         let mut observers = (&mut recorder, waves);
         for &(_, end) in &spans {
-            kernel.run(
-                &mut stimulus,
-                end + bench.clock().periods(2),
-                &mut observers,
-            );
+            kernel
+                .run(
+                    &mut stimulus,
+                    end + bench.clock().periods(2),
+                    &mut observers,
+                )
+                .expect("no loop of cells without delay");
             found.push(bench.memories(&kernel));
         }
         kernel.now()

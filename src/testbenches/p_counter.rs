@@ -19,7 +19,7 @@ use crate::chip::{
 };
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Observer, Recorder, clock, in_order};
+use crate::kernel::{Drive, Kernel, Observer, Recorder, Stimulus, clock};
 use crate::logic::Logic;
 use crate::netlist::{CellKind, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
@@ -282,18 +282,22 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let clock_edges = clock(bench.clk, exposure.clock, origin, -BEFORE, half_periods);
     drives.extend(clock_edges);
 
-    let mut stimulus = in_order(drives);
+    let mut stimulus = Stimulus::sorted(drives);
     let mut kernel = bench.kernel();
     let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
     let mut unknowns = Unknowns::default();
     let mut unknown_at_release = 0;
     let view = view(&bench.netlist, stop(0), stop(5));
     write_waves(waves, &bench.netlist, &view, |waves| {
-        kernel.run(&mut stimulus, RESET_END, &mut (&mut recorder, &mut *waves));
+        kernel
+            .run(&mut stimulus, RESET_END, &mut (&mut recorder, &mut *waves))
+            .expect("no loop of cells without delay");
         let nets = (0..bench.netlist.net_count()).map(NetId::new);
         unknown_at_release = nets.filter(|&net| kernel.value(net) == Logic::X).count();
         let mut observers = ((&mut recorder, &mut unknowns), waves);
-        kernel.run(&mut stimulus, end, &mut observers);
+        kernel
+            .run(&mut stimulus, end, &mut observers)
+            .expect("no loop of cells without delay");
         end
     })?;
 
@@ -499,7 +503,8 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     let mut recorder = Recorder::new(counter_out.chain([bench.local_stop]));
     bench
         .kernel()
-        .run(&mut in_order(drives), at(period), &mut recorder);
+        .run(&mut Stimulus::sorted(drives), at(period), &mut recorder)
+        .expect("no loop of cells without delay");
 
     let mut rises = recorder.rising_edges(bench.local_stop);
     if config.after_borrow == AfterBorrow::Wrap {

@@ -204,7 +204,9 @@ impl Tdc {
             drives.sort_by_key(|drive| drive.time);
             let (before, after): (Vec<_>, Vec<_>) =
                 drives.into_iter().partition(|drive| drive.time <= read);
-            kernel.run(&mut before.into_iter().peekable(), read, &mut ());
+            kernel
+                .run(&mut before.into_iter().peekable(), read, &mut ())
+                .expect("no loop of cells without delay");
             for (lane, &(started, stopped)) in conversions.iter().enumerate() {
                 let word = kernel.number(&code, lane);
                 let found = match self.code {
@@ -221,7 +223,9 @@ impl Tdc {
                 }
             }
             let end = next - Time::from_fs(1);
-            kernel.run(&mut after.into_iter().peekable(), end, &mut ());
+            kernel
+                .run(&mut after.into_iter().peekable(), end, &mut ())
+                .expect("no loop of cells without delay");
         }
         let conversions = BATCHES as usize * LANES;
         checks.equal(

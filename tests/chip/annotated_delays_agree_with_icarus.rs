@@ -8,9 +8,9 @@ use std::collections::HashSet;
 
 use guided_dtof::chip::{Exposure, SensorConfig, array};
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::netlist::{Corner, Library, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
+use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use icarus::{Seen, random_delays};
@@ -39,7 +39,7 @@ fn compare(seed: u64, sdf: impl FnOnce(&Netlist, &Timing, &mut StdRng) -> String
     let pulses = [&pulses[..]];
 
     let netlist = Netlist::elaborate(&array::circuit(&config));
-    let nominal = Timing::nominal(&netlist, &Library::default(), config.corner);
+    let nominal = Timing::nominal(&netlist, &Library::generic_40nm(), config.corner);
     let text = sdf(&netlist, &nominal, random);
     let sdf = Sdf::parse("chip.sdf", &text).unwrap();
     let mut timing = nominal;

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use guided_dtof::chip::{ChipTiming, SensorConfig};
-use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Corner, Library, Module, NetId, Netlist, Timing};
 use guided_dtof::units::Time;
@@ -42,7 +42,7 @@ impl Bench {
     }
 
     pub fn delay(&self, kind: CellKind, pin: usize, to: Logic) -> Time {
-        Library::default().delay(kind, pin, to, self.config.corner)
+        Library::generic_40nm().delay(kind, pin, to, self.config.corner)
     }
 
     pub fn net(&self, path: &str) -> NetId {
@@ -76,9 +76,9 @@ impl Bench {
             recorder: Recorder::new(nets),
             kernel: Kernel::new(
                 &self.netlist,
-                &Timing::nominal(&self.netlist, &Library::default(), self.config.corner),
+                &Timing::nominal(&self.netlist, &Library::generic_40nm(), self.config.corner),
             ),
-            stimulus: in_order(std::mem::take(&mut self.drives)),
+            stimulus: Stimulus::sorted(std::mem::take(&mut self.drives)),
         }
     }
 }
@@ -92,7 +92,8 @@ pub struct Run {
 impl Run {
     pub fn until(&mut self, time: Time) {
         self.kernel
-            .run(&mut self.stimulus, time, &mut self.recorder);
+            .run(&mut self.stimulus, time, &mut self.recorder)
+            .unwrap();
     }
 
     /// The number on a bus at `time`, which must not be in the past.

@@ -394,7 +394,7 @@ fn correlate(
     let starts: Vec<_> = starts
         .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)))
         .collect();
-    let timing = Timing::nominal(&netlist, &Library::default(), corner);
+    let timing = Timing::nominal(&netlist, &Library::generic_40nm(), corner);
     let arrivals = StaticTiming::new(&netlist, &timing)
         .arrivals(&starts, &[])
         .unwrap();
@@ -425,7 +425,7 @@ fn the_correlation_block_counts_every_pattern_of_spads() {
 fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold() {
     const THRESHOLDS: u8 = 18;
     let netlist = Netlist::elaborate(&correlation::circuit(16));
-    let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+    let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
     let bus = |path: &str| netlist.signal(path).unwrap();
     let (timed, code, threshold) = (bus("SPAD_TIMED"), bus("TYPE"), bus("THRESHOLD"));
     let event = netlist.net("SPAD_EVENT").unwrap();
@@ -460,11 +460,13 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
                     })
                     .collect();
                 now += step;
-                kernel.run(
-                    &mut drives.into_iter().peekable(),
-                    now - Time::from_fs(1),
-                    &mut (),
-                );
+                kernel
+                    .run(
+                        &mut drives.into_iter().peekable(),
+                        now - Time::from_fs(1),
+                        &mut (),
+                    )
+                    .unwrap();
                 let expected = (0..64).fold(0, |word, lane| {
                     let is_met = correlation::model(upper << 6 | lane, event_type, t);
                     word | u64::from(is_met) << lane

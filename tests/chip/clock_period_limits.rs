@@ -42,7 +42,7 @@ fn the_typical_corner_has_the_published_ripple_and_period() {
     let (kept, by_gates) = limits(&TYPICAL, Limits::Kept);
     assert_eq!(kept, by_gates);
     // The hold time, twice, is all that the limits add.
-    let hold = Library::default().checks(CellKind::Dffr).hold;
+    let hold = Library::generic_40nm().checks(CellKind::Dffr).hold;
     let hold = Time::from_fs(
         hold.rise
             .at(Corner::Typ)
@@ -115,7 +115,7 @@ fn a_stop_phase_buys_a_shorter_period_below_the_forbidden_band() {
 #[test]
 fn the_longest_correlation_path_is_reached_but_for_its_false_edges() {
     let config = SensorConfig::default();
-    let library = Library::default();
+    let library = Library::generic_40nm();
     for corner in Corner::ALL {
         let silicon = Silicon::nominal(corner);
         let lost = |kind| {
@@ -282,7 +282,7 @@ fn a_macropixels_mismatch_is_its_own_and_the_spread_is_that_of_its_cells() {
     let silicon = mismatched(1);
     let found = spread(&config, &silicon, || ());
     // Independent cells: the variance of the ripple is the sum of theirs.
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let variance = |kind: CellKind, pin, count: f64| {
         let delay = library.delay(kind, pin, Logic::One, Corner::Typ).as_s();
         count * (0.1 * delay).powi(2) * 2.0 / kind.transistors() as f64

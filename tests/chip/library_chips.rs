@@ -10,10 +10,10 @@ use guided_dtof::chip::{
     AfterBorrow, CellLibrary, FromFile, PCounter, Probes, SensorConfig, Tdc, hslidar,
     hslidar_delay_line, macropixel,
 };
-use guided_dtof::netlist::Netlist;
-use guided_dtof::netlist::liberty::{
+use guided_dtof::liberty::{
     Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
 };
+use guided_dtof::netlist::Netlist;
 use guided_dtof::units::Time;
 
 /// CLK's period in mapped.sdc. OpenSTA computes in single precision, and hundreds of long periods would leave it no picoseconds.

@@ -3,7 +3,7 @@
 use crate::library_chips;
 use crate::tool;
 
-use guided_dtof::netlist::liberty::{Characterised, Environment, Liberty, write_mapped};
+use guided_dtof::liberty::{Characterised, Environment, Liberty, write_mapped};
 use guided_dtof::netlist::{CellKind, ModuleBuilder, Netlist};
 
 /// OpenSTA 2.0.17 charges both energies, of rise and fall, at every change; we charge one of them, on average.
@@ -21,8 +21,8 @@ fn of_a_chain_by_opensta() {
             net = m.gate(CellKind::Inv, &[net]);
         }
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let environment = Environment::of(&library);
-        let made = Characterised::of(&netlist, &library, &environment);
+        let environment = Environment::new(&library);
+        let made = Characterised::new(&netlist, &library, &environment);
         let folder = tempfile::tempdir().unwrap();
         let mut verilog = Vec::new();
         write_mapped(&mut verilog, &netlist, &library, &made).unwrap();

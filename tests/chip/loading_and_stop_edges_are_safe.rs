@@ -3,7 +3,7 @@
 
 use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, Window, WindowLaw, macropixel};
 use guided_dtof::engine::{self as fast, Cancelling, Cycle, Gate, GateSimulation, Replay};
-use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, clock, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks, clock};
 use guided_dtof::netlist::{CellKind, CheckKind, Corner, Library, NetId, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::stimulus::{HardwareEventKind, HardwareEvents};
@@ -65,7 +65,7 @@ impl Bench {
             -8,
             half_periods,
         ));
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let mut kernel = Kernel::new(&netlist, &Timing::nominal(&netlist, &library, Corner::Typ));
         let local_stop = nets("LOCAL_STOP")[0];
         let mut recorder = Recorder::new([local_stop]);
@@ -74,11 +74,13 @@ impl Bench {
             .policy(Policy::ReportOnly)
             .not_before(ns(20));
         let end = stop(4);
-        kernel.run(
-            &mut in_order(drives),
-            end,
-            &mut (&mut recorder, (&mut events, &mut checks)),
-        );
+        kernel
+            .run(
+                &mut Stimulus::sorted(drives),
+                end,
+                &mut (&mut recorder, (&mut events, &mut checks)),
+            )
+            .unwrap();
         let found = events.report.hardware_events.iter();
         Bench {
             exposure,
@@ -141,7 +143,7 @@ proptest! {
         let bench = Bench::run(first, second, load, [true; 4]);
         prop_assert!(bench.is_right(0, first));
         let bits = (first ^ second).count_ones() as usize;
-        let written = Library::default().delay(CellKind::Dffr, 1, guided_dtof::logic::Logic::One, Corner::Typ);
+        let written = Library::generic_40nm().delay(CellKind::Dffr, 1, guided_dtof::logic::Logic::One, Corner::Typ);
         let expected = (HardwareEventKind::MemoryWrittenWhileCounting, ORIGIN + load + written);
         prop_assert_eq!(&bench.events, &vec![expected; bits]);
         if first == second {
@@ -286,7 +288,7 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
 }
 
 fn shortened(netlist: &Netlist, factor: f64) -> Timing {
-    let mut timing = Timing::nominal(netlist, &Library::default(), Corner::Typ);
+    let mut timing = Timing::nominal(netlist, &Library::generic_40nm(), Corner::Typ);
     for index in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
         if netlist.cells()[index].kind == CellKind::Buf {
             let mut delays = *timing.of(index);

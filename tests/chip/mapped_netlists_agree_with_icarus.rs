@@ -7,7 +7,7 @@
 //!
 //! Where several cells of the library stand for one of ours the kernel has one delay, the sum, rounded to whole femtoseconds; Icarus rounds each.
 //! A ripple adds such differences up, so edges may be [`APART_FS`] apart. A pulse shorter than the sum, but not than each, comes through in Icarus alone;
-//! Icarus 11 mistakes some of three changes within one delay, too (`netlist/verilog/standard_cells`). The adders of the correlation are full of such pulses and are left
+//! Icarus 11 mistakes some of three changes within one delay, too (`verilog/standard_cells`). The adders of the correlation are full of such pulses and are left
 //! out: what CLK samples of them is compared in the METDC. Elsewhere a few are passed over and counted, and none on [`EXACT`].
 //!
 //! Chips: the QuantIC4x4 with every P-counter whose reset pulse is not more than 50 ps too short in the library (`gdtof timing` says by how much; removal times, which neither
@@ -25,7 +25,7 @@ use std::io::BufReader;
 use guided_dtof::analysis::TimingVerdict;
 use guided_dtof::chip::{Exposure, PCounter, Probe, Silicon};
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
 use guided_dtof::netlist::{Direction, NetId};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
@@ -86,7 +86,9 @@ fn compare(mapped: &Mapped, seed: u64) -> (usize, usize) {
     let all = 0..netlist.net_count();
     let mut recorder = Recorder::new(all.map(NetId::new));
     let timing = &mapped.characterised.timing;
-    Kernel::new(netlist, timing).run(&mut in_order(drives.clone()), end, &mut recorder);
+    Kernel::new(netlist, timing)
+        .run(&mut Stimulus::sorted(drives.clone()), end, &mut recorder)
+        .unwrap();
     let mut ours: BTreeMap<String, Edges> = BTreeMap::new();
     for &(time, net, value) in recorder.changes().iter().filter(|change| change.0 >= from) {
         if let Some(name) = netlist.net_path(net) {

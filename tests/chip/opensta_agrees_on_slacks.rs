@@ -220,7 +220,7 @@ fn ours(mapped: &Mapped) -> Checks {
     };
     let block = &Probe::Block.path("");
     let clk = |edge| after("CLK", edge, &["HIT", block, "ENABLE"]);
-    let no_limits = derated_limits(&Library::default(), 0.0);
+    let no_limits = derated_limits(&Library::generic_40nm(), 0.0);
     let all = Requirements::behind(netlist, Edge::BOTH.map(clk), &no_limits, Corner::Typ);
     let launches = [Launch::ClkRise, Launch::ClkFall];
     let mut checks = Checks::new();
@@ -231,7 +231,7 @@ fn ours(mapped: &Mapped) -> Checks {
         let limits = timing.limits(requirement.cell, leaf.kind);
         let limit = f64::from(limits.at(Control::Reset, kind, edge)) * 1e-6;
         let arrivals = all.arrivals(requirement.launch);
-        let window = arrivals.edge_window(leaf.inputs[0], edge);
+        let window = arrivals.edge_window(leaf.input(0), edge);
         let window = window.map(|(first, last)| {
             if kind == CheckKind::Setup {
                 last
@@ -264,7 +264,7 @@ fn ours(mapped: &Mapped) -> Checks {
     // A reset ends with the clocks of the flip-flops that it holds.
     let start = (netlist.net("STOP").unwrap(), Edge::Rise);
     let counter = Probes::p_counter_cells(netlist).into_iter();
-    let clocks = counter.map(|cell| netlist.cells()[cell].inputs[1]);
+    let clocks = counter.map(|cell| netlist.cells()[cell].input(1));
     let cuts: Vec<NetId> = nets(&["HIT", &Probe::Strobe.path("")])
         .into_iter()
         .chain(clocks)
@@ -287,10 +287,8 @@ fn ours(mapped: &Mapped) -> Checks {
         for &(pin, control) in controls {
             for (launch, arrivals) in sources {
                 for capture in Edge::BOTH {
-                    let clock = all
-                        .arrivals(capture)
-                        .edge_window(leaf.inputs[1], Edge::Rise);
-                    let release = arrivals.edge_window(leaf.inputs[pin], Edge::Fall);
+                    let clock = all.arrivals(capture).edge_window(leaf.input(1), Edge::Rise);
+                    let release = arrivals.edge_window(leaf.input(pin), Edge::Fall);
                     let (Some((early, late)), Some((first, last))) = (clock, release) else {
                         continue;
                     };

@@ -46,11 +46,11 @@ fn counter(config: &SensorConfig) -> Bench {
 /// The ways through gates into a net: flip-flops' outputs or inputs of the circuit, each with the gates' delay.
 fn ways(bench: &Bench, net: NetId, behind: Time) -> Vec<(NetId, Time)> {
     let mut cells = bench.netlist.cells().iter();
-    match cells.find(|cell| cell.outputs.contains(&net)) {
+    match cells.find(|cell| cell.outputs.contains(&Some(net))) {
         Some(gate) if !gate.kind.is_flip_flop() => {
-            let inputs = gate.inputs[..gate.kind.inputs().len()].iter().enumerate();
+            let inputs = gate.input_nets().enumerate();
             let delay = |pin| behind + bench.delay(gate.kind, pin, One);
-            let ways = |(pin, &input)| ways(bench, input, delay(pin));
+            let ways = |(pin, input)| ways(bench, input, delay(pin));
             inputs.flat_map(ways).collect()
         }
         _ => vec![(net, behind)],
@@ -63,7 +63,7 @@ fn way_past_the_memory(bench: &Bench) -> Option<Time> {
     let memory = probes.find(Probe::Memory)?;
     let flip_flops = bench.netlist.cells().iter();
     let clocks = flip_flops.filter(|cell| cell.kind.is_flip_flop());
-    let ways = clocks.map(|cell| ways(bench, cell.inputs[1], Time::ZERO));
+    let ways = clocks.map(|cell| ways(bench, cell.input(1), Time::ZERO));
     let mixed = ways.filter(|ways| ways.iter().any(|way| memory.contains(&way.0)));
     let from_counter = mixed.flatten().filter(|way| !memory.contains(&way.0));
     from_counter.map(|way| way.1).max()

@@ -66,13 +66,13 @@ fn behind_the_last_flip_flop(bench: &Bench) -> Time {
     let (mut net, mut behind) = (bench.net("LOCAL_STOP"), Time::ZERO);
     loop {
         let mut cells = bench.netlist.cells().iter();
-        let driver = cells.find(|cell| cell.outputs.contains(&net));
+        let driver = cells.find(|cell| cell.outputs.contains(&Some(net)));
         let driver = driver.expect("LOCAL_STOP has a driver");
         if driver.kind.is_flip_flop() {
             return behind;
         }
         behind += bench.delay(driver.kind, 0, One);
-        net = driver.inputs[0];
+        net = driver.input(0);
     }
 }
 
@@ -170,7 +170,7 @@ proptest! {
 fn the_ripple_is_the_sum_of_its_stages() {
     use guided_dtof::netlist::Library;
     for corner in Corner::ALL {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let delay = |kind, pin| library.delay(kind, pin, One, corner);
         let (custom, library_cell) = (delay(CellKind::Dffr, 1), delay(CellKind::Dffsr, 1));
         let (mux, buffer) = (delay(CellKind::Mux2, 0), delay(CellKind::Buf, 0));

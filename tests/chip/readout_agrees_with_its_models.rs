@@ -15,7 +15,7 @@ use guided_dtof::chip::readout::{self, ReadoutOrder, Scanner, Serialiser};
 use guided_dtof::chip::{SensorConfig, SensorPins};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::readout::{PinSampler, read_out, readout_netlist};
-use guided_dtof::kernel::{Drive, Kernel, Observer, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Observer, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::NetId;
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
@@ -195,7 +195,7 @@ proptest! {
         }
         let mut sampler = PinSampler::new(&bench.netlist, |_| Logic::X);
         let mut run = bench.start(&[]);
-        run.kernel.run(&mut run.stimulus, now, &mut sampler);
+        run.kernel.run(&mut run.stimulus, now, &mut sampler).unwrap();
         let wanted = order.streams(&counts);
         for (found, wanted) in sampler.streams().iter().zip(&wanted) {
             let again = wanted.iter().chain(wanted.iter().cycle());
@@ -271,8 +271,7 @@ fn the_readout_causes_no_event_while_nothing_is_read() {
     for (index, scope) in netlist.scopes().iter().enumerate() {
         if is_readout(&scope.name) {
             for cell in netlist.cells_of(index) {
-                let outputs = netlist.cells()[cell].outputs;
-                for net in outputs.iter().filter(|net| net.is_some()) {
+                for net in netlist.cells()[cell].output_nets() {
                     nets[net.index()] = true;
                 }
             }
@@ -383,11 +382,13 @@ fn a_reading_during_the_exposure_leaves_the_counts_as_they_are() {
         }
         drives.push(Drive::new(now + HALF, pins.read.enable, false));
         let mut kernel = Kernel::new(netlist, gate.timing());
-        let mut stimulus = in_order(drives);
-        kernel.run(&mut stimulus, now + HALF * 2, &mut ());
+        let mut stimulus = Stimulus::sorted(drives);
+        kernel.run(&mut stimulus, now + HALF * 2, &mut ()).unwrap();
         // What is read after it is right again.
         let mut sampler = PinSampler::new(netlist, |net| kernel.value(net));
-        kernel.run(&mut stimulus, schedule.end, &mut sampler);
+        kernel
+            .run(&mut stimulus, schedule.end, &mut sampler)
+            .unwrap();
         let read = sampler.counts(&plan.readout().unwrap());
         let wanted = counters.counts().iter().map(|&count| Some(count));
         assert!(read.into_iter().eq(wanted), "seed {seed}");

@@ -16,12 +16,11 @@ use std::process::Command;
 
 use guided_dtof::chip::{PCounter, SensorConfig, array, hslidar_delay_line, quantic4x4};
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
-use guided_dtof::netlist::{
-    CellKind, Corner, Library, Netlist, Timing, write_cells, write_standard_cells,
-};
+use guided_dtof::netlist::{CellKind, Corner, Library, Netlist, Timing};
+use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
+use guided_dtof::verilog::{write_cells, write_standard_cells};
 use icarus::Seen;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
@@ -121,7 +120,7 @@ fn delays_are_written_without_elaborating_the_design() {
             cols: 3,
             ..(*sensor).clone()
         };
-        let (top, library) = (array::circuit(&config), Library::default());
+        let (top, library) = (array::circuit(&config), Library::generic_40nm());
         let netlist = Netlist::elaborate(&top);
         let corners = Corner::ALL.map(|corner| Timing::nominal(&netlist, &library, corner));
         let options = SdfOptions::default();
@@ -196,7 +195,7 @@ endmodule
 
 /// Both models of every cell in the typical corner: files standard.v and exact.v.
 fn write_both_models(folder: &Path) {
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let mut text = Vec::new();
     write_standard_cells(&mut text, &library, &BTreeSet::new()).unwrap();
     fs::write(folder.join("standard.v"), &text).unwrap();

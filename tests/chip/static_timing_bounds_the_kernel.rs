@@ -7,7 +7,7 @@ use guided_dtof::chip::{
     Overflow, PCounter, SensorConfig, correlation, front_end, histogram, load_path, metdc,
     p_counter,
 };
-use guided_dtof::kernel::{Drive, Kernel, Observer, merge};
+use guided_dtof::kernel::{Drive, Kernel, Observer, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
     ArcDelay, CellKind, Corner, Edge, Library, Module, ModuleBuilder, NetId, Netlist, StaticTiming,
@@ -61,8 +61,10 @@ fn check(
             from: now,
             seen: Vec::new(),
         };
-        let mut stimulus = merge([Box::new(drives) as Box<dyn Iterator<Item = Drive> + Send>]);
-        kernel.run(&mut stimulus, now + GAP - Time::from_fs(1), &mut changes);
+        let mut stimulus = Stimulus::new(drives);
+        kernel
+            .run(&mut stimulus, now + GAP - Time::from_fs(1), &mut changes)
+            .unwrap();
         for (time, net, value) in changes.seen.into_iter().filter(|_| index > 1) {
             let edge = Edge::to(value).expect("everything is known after the reset");
             let window = arrivals.edge_window(net, edge);
@@ -124,7 +126,7 @@ proptest! {
         words in prop::collection::vec(0u64..128, 1..12),
     ) {
         let netlist = Netlist::elaborate(&random_circuit(&choices));
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let mut next = delays.iter().cycle();
         for cell in 0..netlist.cells().len() {
             let mut arc = || {
@@ -152,7 +154,7 @@ proptest! {
             _ => p_counter::circuit(&sensor(PCounter::ALL[block - 6], 9)),
         };
         let netlist = Netlist::elaborate(&circuit);
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         check(&netlist, &timing, &words, u64::MAX)?;
     }
 
@@ -164,7 +166,7 @@ proptest! {
     ) {
         prop_assume!(p_counter.row().has_memory);
         let netlist = Netlist::elaborate(&p_counter::circuit(&sensor(p_counter, bits)));
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let net = |name| netlist.net(name).unwrap();
         let (clk, stop) = (net("COUNTER_CLK"), net("LOCAL_STOP"));
         let analysis = StaticTiming::new(&netlist, &timing);
@@ -192,9 +194,9 @@ proptest! {
             drive(40 + 10 * edge, clk, true);
             drive(45 + 10 * edge, clk, false);
         }
-        let mut stimulus = merge([Box::new(drives.into_iter()) as Box<dyn Iterator<Item = Drive> + Send>]);
+        let mut stimulus = Stimulus::new(drives);
         let mut recorder = guided_dtof::kernel::Recorder::new([stop]);
-        Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(last + 20), &mut recorder);
+        Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(last + 20), &mut recorder).unwrap();
         prop_assert_eq!(recorder.rising_edges(stop), [Time::from_ns(last) + longest]);
     }
 }

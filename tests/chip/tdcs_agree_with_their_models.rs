@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use bench::{SETTLING, corners};
 use guided_dtof::chip::tdc::{clock_counter, delay_line, ring_oscillator};
-use guided_dtof::kernel::{Drive, Kernel, in_order};
+use guided_dtof::kernel::{Drive, Kernel, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Corner, Library, Mismatch, Module, Netlist, Timing, varied};
 use guided_dtof::units::Time;
@@ -26,7 +26,7 @@ struct Converter {
 impl Converter {
     fn new(module: &Arc<Module>, corner: Corner, mismatch_seed: u64) -> Self {
         let netlist = Netlist::elaborate(module);
-        let nominal = Timing::nominal(&netlist, &Library::default(), corner);
+        let nominal = Timing::nominal(&netlist, &Library::generic_40nm(), corner);
         let mismatch = Mismatch {
             sigma: 0.2,
             seed: mismatch_seed,
@@ -67,15 +67,17 @@ impl Converter {
         }
         let code = self.netlist.signal(code).unwrap();
         let mut kernel = Kernel::new(&self.netlist, &self.timing);
-        let mut stimulus = in_order(drives);
+        let mut stimulus = Stimulus::sorted(drives);
         let slots = 1..=intervals.len() as i64;
         slots
             .map(|slot| {
-                kernel.run(
-                    &mut stimulus,
-                    SLOT * slot - SETTLING - Time::from_fs(1),
-                    &mut (),
-                );
+                kernel
+                    .run(
+                        &mut stimulus,
+                        SLOT * slot - SETTLING - Time::from_fs(1),
+                        &mut (),
+                    )
+                    .unwrap();
                 kernel.number(&code)
             })
             .collect()

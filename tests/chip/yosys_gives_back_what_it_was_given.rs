@@ -17,9 +17,10 @@ use guided_dtof::chip::p_counter::{self, starts_high};
 use guided_dtof::chip::{
     Overflow, OwnBlock, SensorConfig, Window, WindowLaw, correlation, histogram, metdc, readout,
 };
-use guided_dtof::netlist::{Corner, Library, Module, write_modules, write_standard_cells};
+use guided_dtof::netlist::{Corner, Library, Module};
 use guided_dtof::settings::Document;
 use guided_dtof::units::Time;
+use guided_dtof::verilog::{write_modules, write_standard_cells};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 /// What Yosys writes of the Verilog in `folder/block.v` as generic gates, or what `mapping` makes of them; none where it is not installed.
@@ -47,7 +48,7 @@ fn there_and_back(module: &Arc<Module>) -> Option<(Arc<Module>, String)> {
     let folder = tempfile::tempdir().unwrap();
     let mut verilog = Vec::new();
     write_modules(&mut verilog, module).unwrap();
-    write_standard_cells(&mut verilog, &Library::default(), &BTreeSet::new()).unwrap();
+    write_standard_cells(&mut verilog, &Library::generic_40nm(), &BTreeSet::new()).unwrap();
     std::fs::write(folder.path().join("block.v"), verilog).unwrap();
     let json = synthesised(folder.path(), module.name(), "")?;
     let read = Module::from_yosys(&json, None).unwrap();

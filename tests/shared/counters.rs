@@ -212,10 +212,10 @@ impl<'r> Circuit<'r> {
         if value {
             let data = self.gate(Inv, &[data]);
             self.m
-                .cell(&name, Dffr, &[data, clock, reset], &[Net::NONE, q]);
+                .cell(&name, Dffr, &[data, clock, reset], &[None, Some(q)]);
         } else {
             self.m
-                .cell(&name, Dffr, &[data, clock, reset], &[q, Net::NONE]);
+                .cell(&name, Dffr, &[data, clock, reset], &[Some(q), None]);
         }
     }
 
@@ -262,7 +262,7 @@ impl<'r> Circuit<'r> {
                     let [set, clear] =
                         [data[bit], zero].map(|data| self.gate(And2, &[self.load, data]));
                     let inputs = [q, self.zero, clear, set];
-                    self.m.cell("transparent", Dffsr, &inputs, &[q, Net::NONE]);
+                    self.m.cell("transparent", Dffsr, &inputs, &[Some(q), None]);
                     self.named = Some("MEMORY[");
                 }
                 Late if bit == odd => {
@@ -466,7 +466,7 @@ impl<'r> Circuit<'r> {
         let [set, clear] = [value, other].map(|value| self.gate(And2, &[loads, value]));
         let inputs = [next, self.clk, clear, set];
         self.m
-            .cell(&format!("count_{bit}"), Dffsr, &inputs, &[q, Net::NONE]);
+            .cell(&format!("count_{bit}"), Dffsr, &inputs, &[Some(q), None]);
     }
 
     fn memoryless(&mut self, hidden: Hidden) -> (Net, Net) {
@@ -560,7 +560,7 @@ impl<'r> Circuit<'r> {
         }
         let inputs = [hit, self.clk, reset];
         self.m
-            .cell("stop", Dffr, &inputs, &[self.local_stop, Net::NONE]);
+            .cell("stop", Dffr, &inputs, &[Some(self.local_stop), None]);
         (self.m.finish().unwrap(), self.named)
     }
 }

@@ -66,13 +66,13 @@ pub fn json(module: &Arc<Module>) -> String {
             CellKind::Dffsr => "$_DFFSR_PPP_",
         };
         let mut pins = String::new();
-        for (pin, net) in cell.kind.inputs().iter().zip(cell.inputs) {
+        for (pin, net) in cell.kind.inputs().iter().zip(cell.input_nets()) {
             let pin = if *pin == "CK" { "C" } else { pin };
             write!(pins, r#""{pin}": {}, "#, bits(&[net])).unwrap();
         }
-        let out = match cell.outputs[0].is_some() {
-            true => cell.outputs[0].index() + 2,
-            false => {
+        let out = match cell.outputs[0] {
+            Some(net) => net.index() + 2,
+            None => {
                 next += 1;
                 next - 1
             }
@@ -88,8 +88,8 @@ pub fn json(module: &Arc<Module>) -> String {
             kind,
             format!(r#"{pins}"{pin}": [{out}]"#),
         );
-        if cell.outputs[1].is_some() {
-            let pins = format!(r#""A": [{out}], "Y": {}"#, bits(&cell.outputs[1..2]));
+        if let Some(inverted) = cell.outputs[1] {
+            let pins = format!(r#""A": [{out}], "Y": {}"#, bits(&[inverted]));
             add(format!("$qn${index}"), "$_NOT_", pins);
         }
     }

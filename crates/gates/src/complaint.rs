@@ -154,6 +154,7 @@ impl InputError {
         }
     }
 
+    /// Complains about a file that cannot be read.
     pub fn unreadable(path: &Path, error: &io::Error) -> Self {
         Self::new(
             path.display(),
@@ -164,6 +165,7 @@ impl InputError {
         )
     }
 
+    /// Complains about a file that cannot be written.
     pub fn unwritable(path: &Path, error: &io::Error) -> Self {
         use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         let cure = match error.kind() {

@@ -17,5 +17,13 @@ pub mod ranging;
 pub mod stimulus;
 pub mod waves;
 
-pub use femtogate::{Origin, kernel, logic, netlist};
+pub use femtogate::{Origin, kernel, liberty, logic, netlist, sdf, verilog};
+
+/// The program that files of this project name as their writer.
+pub const ORIGIN: Origin = Origin {
+    vendor: "guided-dtof",
+    program: "gdtof",
+    version: env!("CARGO_PKG_VERSION"),
+};
+
 pub use guided_dtof_light::{files, numerics, photon, settings, theory, units};

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 pub use femtogate::waves::*;
 
+use crate::ORIGIN;
 use crate::files::{InputError, OutputFile, begins_with, set_aside_foreign};
 use crate::kernel::Observer;
 use crate::logic::Logic;
@@ -68,11 +69,13 @@ impl WaveFile {
         let file = OutputFile::create(path)?;
         let writer = match format {
             WaveFormat::Vcd => {
-                let writer = VcdWriter::new(file, netlist, selection).map_err(failed)?;
+                let writer =
+                    VcdWriter::with_origin(file, netlist, selection, ORIGIN).map_err(failed)?;
                 Writer::Vcd(Box::new(writer.keep(span)))
             }
             WaveFormat::Fst => {
-                let writer = FstWriter::new(file, netlist, selection).map_err(failed)?;
+                let writer =
+                    FstWriter::with_origin(file, netlist, selection, ORIGIN).map_err(failed)?;
                 Writer::Fst(Box::new(writer.keep(span)))
             }
         };
@@ -120,9 +123,9 @@ pub(crate) fn write_views(
         .map(OsStr::to_string_lossy)
         .unwrap_or_default();
     let [gtkw, surfer] = VIEWS.map(|extension| path.with_extension(extension));
-    set_aside_foreign(&gtkw, begins_with(&Layout::gtkw_signature()))?;
+    set_aside_foreign(&gtkw, begins_with(&Layout::gtkw_signature(ORIGIN)))?;
     set_aside_foreign(&surfer, begins_with(Layout::SURFER_SIGNATURE))?;
-    OutputFile::write_with(&gtkw, |out| layout.write_gtkw(out, netlist, &name))?;
+    OutputFile::write_with(&gtkw, |out| layout.write_gtkw(out, netlist, &name, ORIGIN))?;
     OutputFile::write_with(&surfer, |out| layout.write_surfer(out, netlist, &name, end))
 }
 

@@ -1,7 +1,7 @@
 //! All front ends on the same SPADs, and what each counts in a light.
 
 use crate::chip::{FrontEnd, SensorConfig, front_end};
-use crate::kernel::{Drive, Kernel, Observer, in_order};
+use crate::kernel::{Drive, Kernel, Observer, Stimulus};
 use crate::logic::Logic;
 use crate::netlist::{Corner, Library, ModuleBuilder, NetId, Netlist, Timing};
 use crate::theory::front_ends::non_paralysable_hz;
@@ -49,7 +49,7 @@ impl Bench {
         }
         let netlist = Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"));
         Bench {
-            timing: Timing::nominal(&netlist, &Library::default(), Corner::Typ),
+            timing: Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ),
             config: config(FrontEnd::OrTree),
             netlist,
         }
@@ -101,7 +101,9 @@ impl Bench {
                 .map(|(k, tick)| Drive::new(tick, clk, k % 2 == 1)),
         );
         let mut kernel = Kernel::new(&self.netlist, &self.timing);
-        kernel.run(&mut in_order(drives), end, observer);
+        kernel
+            .run(&mut Stimulus::sorted(drives), end, observer)
+            .expect("no loop of cells without delay");
     }
 
     /// Counts of all front ends in this light.

@@ -28,7 +28,7 @@ pub(super) struct Laws {
 
 impl Laws {
     pub(super) fn new(bench: &Bench) -> Self {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let delay = |kind, to| library.delay(kind, 0, to, Corner::Typ).as_s();
         let width_s = ChipTiming::of(&bench.config)
             .pulses

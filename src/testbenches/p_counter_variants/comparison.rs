@@ -4,7 +4,7 @@ use crate::analysis::{MacropixelTiming, gate_works, ripple, shortest_period};
 use crate::chip::{
     Limits, PCounter, Probe, Probes, SensorConfig, Silicon, macropixel, p_counter, p_counter_timing,
 };
-use crate::kernel::{Drive, Kernel, Recorder, in_order};
+use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
 use crate::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
 use crate::report::{Checks, Grid};
 use crate::units::Time;
@@ -240,7 +240,9 @@ impl Activity {
         }
         let mut recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
         let mut kernel = Kernel::new(netlist, &TYPICAL.timing(netlist));
-        kernel.run(&mut in_order(drives), edge(counts), &mut recorder);
+        kernel
+            .run(&mut Stimulus::sorted(drives), edge(counts), &mut recorder)
+            .expect("no loop of cells without delay");
 
         let probes = Probes::of_block(netlist);
         let local_stop = probes.net(Probe::LocalStop);

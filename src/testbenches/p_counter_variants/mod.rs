@@ -29,7 +29,7 @@ use crate::chip::{
 use crate::chip::{Irregular, Window};
 use crate::engine::waveform::write_waves;
 use crate::files::{InputError, OutputFile};
-use crate::kernel::{Drive, Kernel, Recorder, clock, in_order};
+use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
 use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
@@ -231,11 +231,13 @@ impl Bench {
         let mut kernel = Kernel::new(&self.netlist, &timing);
         let end = self.at(SLOW_LASER.end() + 40);
         write_waves(waves, &self.netlist, &self.view(), |waves| {
-            kernel.run(
-                &mut in_order(self.drives()),
-                end,
-                &mut (&mut recorder, waves),
-            );
+            kernel
+                .run(
+                    &mut Stimulus::sorted(self.drives()),
+                    end,
+                    &mut (&mut recorder, waves),
+                )
+                .expect("no loop of cells without delay");
             end
         })?;
         Ok(recorder)

@@ -7,7 +7,7 @@ use crate::chip::{
 };
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Recorder, clock, in_order};
+use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
 use crate::netlist::{ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::units::Time;
@@ -61,8 +61,10 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         .with_file_name("tb_p_counters")
         .with_extension(waves.extension().unwrap_or_default());
     write_waves(&file, &netlist, &view(&netlist, end), |waves| {
-        let mut drives = in_order(drives(&netlist, &exposure));
-        kernel.run(&mut drives, end, &mut (&mut recorder, waves));
+        let mut drives = Stimulus::sorted(drives(&netlist, &exposure));
+        kernel
+            .run(&mut drives, end, &mut (&mut recorder, waves))
+            .expect("no loop of cells without delay");
         end
     })?;
 

@@ -20,7 +20,7 @@ pub(super) const BEGIN: Time = Time::from_ns(4);
 /// The netlist of a converter, and its delays with a mismatch of `sigma`.
 pub(super) fn made(module: &Arc<Module>, sigma: f64, seed: u64) -> (Netlist, Timing) {
     let netlist = Netlist::elaborate(module);
-    let nominal = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+    let nominal = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
     let mismatch = Mismatch { sigma, seed };
     let timing = varied(&netlist, &nominal, 1.0, Some(mismatch));
     (netlist, timing)

@@ -15,7 +15,7 @@ use super::converter::{BEGIN, BITS, SIGMA, STAGES, made};
 use crate::chip::tdc::coupling::Row;
 use crate::chip::tdc::ring_oscillator;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Recorder, in_order};
+use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
 use crate::netlist::ModuleBuilder;
 use crate::report::{Axis, Chart, Checks};
 use crate::units::Time;
@@ -56,7 +56,9 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let start = netlist.net("START").expect("it is an input");
     drives.push(Drive::new(BEGIN, start, true));
     let mut recorder = Recorder::new(nets.iter().copied());
-    Kernel::new(&netlist, &timing).run(&mut in_order(drives), SHOWN, &mut recorder);
+    Kernel::new(&netlist, &timing)
+        .run(&mut Stimulus::sorted(drives), SHOWN, &mut recorder)
+        .expect("no loop of cells without delay");
 
     let mut free_hz = Vec::new();
     let mut wrong = 0;

@@ -8,7 +8,7 @@ use super::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
 use crate::chip::tdc::{clock_counter, delay_line, ring_oscillator};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, in_order};
+use crate::kernel::{Drive, Kernel, Stimulus};
 use crate::netlist::ModuleBuilder;
 use crate::report::Checks;
 use crate::units::{Frequency, Time};
@@ -72,14 +72,18 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         delay_line::model(&netlist, &timing, "line"),
     ];
     let mut kernel = Kernel::new(&netlist, &timing);
-    let mut stimulus = in_order(drives);
+    let mut stimulus = Stimulus::sorted(drives);
     let mut found = Vec::new();
     write_waves(waves, &netlist, &view(), |waves| {
         for slot in 1..=intervals.len() as i64 {
-            kernel.run(&mut stimulus, SLOT * slot - Time::from_ns(6), waves);
+            kernel
+                .run(&mut stimulus, SLOT * slot - Time::from_ns(6), waves)
+                .expect("no loop of cells without delay");
             found.push(nets.each_ref().map(|nets| kernel.number(nets)));
         }
-        kernel.run(&mut stimulus, end, waves);
+        kernel
+            .run(&mut stimulus, end, waves)
+            .expect("no loop of cells without delay");
         end
     })?;
     for (&interval, found) in intervals.iter().zip(found) {

@@ -52,10 +52,9 @@ pub(super) fn flip_flops(netlist: &Netlist) -> Vec<FlipFlop> {
         .filter(|(_, cell)| cell.kind.is_flip_flop())
         .map(|(index, cell)| FlipFlop {
             cell: index as u32,
-            nets: cell.inputs.map(|net| match net.is_some() {
-                true => net.index() as u32,
-                false => NO_NET,
-            }),
+            nets: cell
+                .inputs
+                .map(|net| net.map_or(NO_NET, |net| net.index() as u32)),
             is_asynchronous: false,
             limits: u32::from(cell.kind == CellKind::Dffsr),
             bank: 0,

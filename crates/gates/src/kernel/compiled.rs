@@ -5,7 +5,7 @@
 
 use crate::logic::Logic;
 use crate::netlist::{
-    ArcDelay, CellDelays, CellKind, FlatCell, MAX_INPUTS, Netlist, Timing, next_state,
+    ArcDelay, CellDelays, CellKind, FlatCell, MAX_INPUTS, NetId, Netlist, Timing, next_state,
 };
 
 /// One entry of a net's fan-out: cell and pin in one word.
@@ -192,7 +192,7 @@ impl Loads {
             let cell = *cell;
             let pins = 0..cell.kind.inputs().len();
             let pins = pins.filter(move |&pin| counts(index, &cell, pin));
-            pins.map(move |pin| (pin, cell.inputs[pin].index()))
+            pins.map(move |pin| (pin, cell.input(pin).index()))
         };
         for (index, cell) in cells.iter().enumerate() {
             for (_, net) in pins(index, cell) {
@@ -232,6 +232,11 @@ impl Loads {
     }
 }
 
+/// A net's number, or the greatest one where there is none.
+fn number(net: Option<NetId>) -> u32 {
+    net.map_or(u32::MAX, |net| net.index() as u32)
+}
+
 /// Every cell with unknown inputs and state; `delays` are the places of [`DelaySet::all`].
 pub(super) fn initial_cells(
     netlist: &Netlist,
@@ -255,16 +260,10 @@ pub(super) fn initial_cells(
                 kind: cell.kind,
                 state: Logic::X.bits(),
                 is_dirty: false,
-                data: cell.inputs[0].index() as u32,
-                clock: cell.inputs[CLOCK].index() as u32,
+                data: number(cell.inputs[0]),
+                clock: number(cell.inputs[CLOCK]),
                 delays: delays[timing.set_of(index) as usize],
-                outputs: cell.outputs.map(|n| {
-                    if n.is_some() {
-                        n.index() as u32
-                    } else {
-                        u32::MAX
-                    }
-                }),
+                outputs: cell.outputs.map(number),
             }
         })
         .collect()
@@ -277,7 +276,7 @@ mod tests {
 
     #[test]
     fn the_delay_is_that_of_the_pin_that_changed() {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let mut m = ModuleBuilder::new("m");
         let (a, b, s) = (m.input("A"), m.input("B"), m.input("S"));
         m.gate(CellKind::Mux2, &[a, b, s]);

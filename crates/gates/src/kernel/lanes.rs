@@ -19,6 +19,7 @@
 
 use super::compiled::{CLOCK, DelaySet, FanOut};
 use super::lane_word::Lanes;
+use super::oscillation::{MOST_DELTA_CYCLES, Oscillation};
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
 use crate::netlist::{CellKind, DelayModel, MAX_INPUTS, NetId, Netlist, Timing};
@@ -123,7 +124,7 @@ impl LaneKernel {
             groups: NONE,
         };
         let (delays, places) = DelaySet::all(netlist, timing);
-        let index = |n: NetId| if n.is_some() { n.index() as u32 } else { NONE };
+        let index = |n: Option<NetId>| n.map_or(NONE, |n| n.index() as u32);
         let cells = netlist
             .cells()
             .iter()
@@ -178,12 +179,15 @@ impl LaneKernel {
     }
 
     /// Simulates everything up to and including `until`. `stimulus` must be in time order.
+    ///
+    /// # Errors
+    /// When a loop of cells without delay oscillates within one instant.
     pub fn run<O: LaneObserver>(
         &mut self,
         stimulus: &mut std::iter::Peekable<impl Iterator<Item = LaneDrive>>,
         until: Time,
         observer: &mut O,
-    ) {
+    ) -> Result<(), Oscillation> {
         let until_fs = until.as_fs();
         loop {
             let drive_fs = stimulus.peek().map_or(i64::MAX, |d| d.time.as_fs());
@@ -202,14 +206,15 @@ impl LaneKernel {
                     self.apply(net, mask, drive.values, observer);
                 }
             }
-            self.settle(observer);
+            self.settle(observer)?;
         }
         self.now_fs = self.now_fs.max(until_fs);
         self.wheel.advance(self.now_fs);
+        Ok(())
     }
 
-    fn settle<O: LaneObserver>(&mut self, observer: &mut O) {
-        loop {
+    fn settle<O: LaneObserver>(&mut self, observer: &mut O) -> Result<(), Oscillation> {
+        for _ in 0..MOST_DELTA_CYCLES {
             while let Some(event) = self.wheel.pop_at(self.now_fs) {
                 let net = event.net as usize;
                 let (mask, values) = self.take_group(net);
@@ -218,7 +223,7 @@ impl LaneKernel {
                 }
             }
             if self.dirty.is_empty() && self.risen.is_empty() {
-                return;
+                return Ok(());
             }
             let mut dirty = std::mem::take(&mut self.dirty);
             for &cell in &dirty {
@@ -231,6 +236,12 @@ impl LaneKernel {
                 self.clock(net as usize);
             }
         }
+        // What is due now is what the last round began.
+        let next = self.wheel.pop_at(self.now_fs).map(|event| event.net);
+        Err(Oscillation {
+            time: Time::from_fs(self.now_fs),
+            net: NetId::new(next.unwrap_or_default() as usize),
+        })
     }
 
     /// The flip-flops on a clock that has risen look at D; most hold already what they would take.

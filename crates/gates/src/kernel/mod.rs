@@ -28,6 +28,7 @@ mod compiled;
 mod lane_word;
 mod lanes;
 mod observer;
+mod oscillation;
 mod shift_banks;
 mod simulation;
 mod stimulus;
@@ -43,7 +44,8 @@ pub use check_report::{
 pub use lane_word::{LANES, Lanes};
 pub use lanes::{LaneDrive, LaneKernel, LaneObserver};
 pub use observer::{Observer, Recorder};
+pub use oscillation::Oscillation;
 pub use simulation::{Kernel, Statistics};
-pub use stimulus::{Drive, Stimulus, clock, in_order, merge};
+pub use stimulus::{Drive, Stimulus, clock};
 pub use timing_checks::TimingChecks;
 pub use trace_hash::TraceHash;

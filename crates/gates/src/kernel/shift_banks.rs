@@ -51,18 +51,20 @@ impl ShiftBank {
         let mut driver = vec![NOBODY; netlist.net_count()];
         let mut is_watched = vec![false; netlist.net_count()];
         for (index, cell) in cells.iter().enumerate() {
-            for (pin, net) in cell.inputs[..cell.kind.inputs().len()].iter().enumerate() {
+            for (pin, net) in cell.input_nets().enumerate() {
                 is_watched[net.index()] |= cell.kind.triggers(pin);
             }
-            if cell.kind == CellKind::Dffr && cell.outputs[0].is_some() {
-                driver[cell.outputs[0].index()] = index;
+            if let (CellKind::Dffr, Some(q)) = (cell.kind, cell.outputs[0]) {
+                driver[q.index()] = index;
             }
         }
         let may_be = |index: usize| {
             let cell = &cells[index];
-            let [q, qn] = cell.outputs;
-            let is_plain = cell.kind == CellKind::Dffr && q.is_some() && !qn.is_some();
-            is_plain && !is_watched[q.index()] && timing.model(index) == DelayModel::Inertial
+            let [Some(q), None] = cell.outputs else {
+                return false;
+            };
+            let is_plain = cell.kind == CellKind::Dffr && !is_watched[q.index()];
+            is_plain && timing.model(index) == DelayModel::Inertial
         };
         let follows = |before: usize, after: usize| {
             let (a, b) = (&cells[before], &cells[after]);
@@ -74,7 +76,7 @@ impl ShiftBank {
         let mut next = vec![NOBODY; cells.len()];
         let mut has_before = vec![false; cells.len()];
         for after in (0..cells.len()).filter(|&index| may_be(index)) {
-            let before = driver[cells[after].inputs[0].index()];
+            let before = driver[cells[after].input(0).index()];
             if before != NOBODY && next[before] == NOBODY && follows(before, after) {
                 next[before] = after;
                 has_before[after] = true;
@@ -96,12 +98,12 @@ impl ShiftBank {
         let cell = |index: usize| &netlist.cells()[index];
         let words = vec![0; chain.len().div_ceil(64)];
         ShiftBank {
-            clock: cell(chain[0]).inputs[CLOCK].index() as u32,
-            data: cell(chain[0]).inputs[0].index() as u32,
+            clock: cell(chain[0]).input(CLOCK).index() as u32,
+            data: cell(chain[0]).input(0).index() as u32,
             cells: chain.iter().map(|&index| index as u32).collect(),
             nets: chain
                 .iter()
-                .map(|&index| cell(index).outputs[0].index() as u32)
+                .filter_map(|&index| Some(cell(index).outputs[0]?.index() as u32))
                 .collect(),
             delays: timing.set_of(chain[0]),
             state: words.clone(),
@@ -152,7 +154,7 @@ impl ShiftBank {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::netlist::{Corner, Library, ModuleBuilder, Net};
+    use crate::netlist::{Corner, Library, ModuleBuilder};
 
     /// What a stage of a shift register may have of its own.
     #[derive(Clone, Copy, PartialEq)]
@@ -177,20 +179,20 @@ mod tests {
             let has = |what: Own| stage == odd && own == what;
             let clock = if has(Own::Clock) { other_ck } else { ck };
             let reset = if has(Own::Reset) { other_r } else { r };
-            let inverted = qn.filter(|_| stage == odd).unwrap_or(Net::NONE);
+            let inverted = qn.filter(|_| stage == odd);
             let name = format!("stage_{stage}");
             m.cell(
                 &name,
                 CellKind::Dffr,
                 &[data, clock, reset],
-                &[q[stage], inverted],
+                &[Some(q[stage]), inverted],
             );
         }
         if own == Own::Gate {
             m.gate(CellKind::Inv, &[q[odd]]);
         }
         let netlist = Netlist::elaborate(&m.finish().expect("a register"));
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         if own == Own::Wire {
             timing.set_model(odd, DelayModel::Transport);
         }

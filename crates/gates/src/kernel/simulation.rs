@@ -6,6 +6,7 @@ mod shuffle;
 use self::shuffle::Shuffle;
 use super::compiled::{CLOCK, CellState, DelaySet, FanOut, Tables, initial_cells};
 use super::observer::Observer;
+use super::oscillation::{MOST_DELTA_CYCLES, Oscillation};
 use super::shift_banks::ShiftBank;
 use super::stimulus::Stimulus;
 use super::transport::TransportQueues;
@@ -25,9 +26,6 @@ const BANKED: u8 = 6;
 
 /// Generation of a queued change; nets with a queue stay at 0.
 const QUEUED_GENERATION: u32 = 1;
-
-/// Rounds of zero-delay changes in one instant after which a loop is assumed to oscillate.
-const MOST_DELTA_CYCLES: u32 = 10_000;
 
 /// Bits of a flip-flop's reset and set in its packed inputs.
 const RESET_AND_SET: u8 = 0b1111_0000;
@@ -157,9 +155,14 @@ impl Kernel {
     /// Drives in the past are a mistake of the caller; they are caught in debug builds and
     /// applied at once otherwise.
     ///
-    /// # Panics
-    /// When a loop of zero-delay cells oscillates within one instant.
-    pub fn run(&mut self, stimulus: &mut Stimulus<'_>, until: Time, observer: &mut dyn Observer) {
+    /// # Errors
+    /// When a loop of cells without delay oscillates within one instant.
+    pub fn run(
+        &mut self,
+        stimulus: &mut Stimulus<'_>,
+        until: Time,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Oscillation> {
         let until_fs = until.as_fs();
         loop {
             let drive_fs = stimulus.peek().map_or(i64::MAX, |d| d.time.as_fs());
@@ -172,18 +175,19 @@ impl Kernel {
             debug_assert!(time_fs >= self.now_fs, "a drive in the past");
             self.now_fs = time_fs.max(self.now_fs);
             self.wheel.advance(self.now_fs);
-            while let Some(drive) = stimulus.next_if(|d| d.time.as_fs() <= self.now_fs) {
+            while let Some(drive) = stimulus.next_until(self.now()) {
                 if self.nets[drive.net.index()].value != drive.value.bits() {
                     self.apply(drive.net.index(), drive.value.bits(), observer);
                 }
             }
-            self.settle(observer);
+            self.settle(observer)?;
             while let Some(cell) = observer.doubtful() {
                 self.corrupt(cell);
             }
         }
         self.now_fs = self.now_fs.max(until_fs);
         self.wheel.advance(self.now_fs);
+        Ok(())
     }
 
     /// Makes the state of flip-flop `cell` unknown, as far as its reset and set leave it open; its outputs
@@ -259,7 +263,7 @@ impl Kernel {
         }
     }
 
-    fn settle(&mut self, observer: &mut dyn Observer) {
+    fn settle(&mut self, observer: &mut dyn Observer) -> Result<(), Oscillation> {
         for _ in 0..MOST_DELTA_CYCLES {
             if self.shuffle.is_some() {
                 self.arrive_shuffled(observer);
@@ -269,7 +273,7 @@ impl Kernel {
                 }
             }
             if self.dirty.is_empty() && self.risen.is_empty() {
-                return;
+                return Ok(());
             }
             let mut dirty = std::mem::take(&mut self.dirty);
             if let Some(shuffle) = &mut self.shuffle {
@@ -287,7 +291,12 @@ impl Kernel {
                 self.clock(net as usize, observer);
             }
         }
-        panic!("zero-delay loop oscillates at {}", self.now());
+        // What is due now is what the last round began.
+        let next = self.wheel.pop_at(self.now_fs).map(|event| event.net);
+        Err(Oscillation {
+            time: self.now(),
+            net: NetId::new(next.unwrap_or_default() as usize),
+        })
     }
 
     #[inline]

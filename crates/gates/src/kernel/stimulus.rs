@@ -2,8 +2,6 @@
 //!
 //! Clocks are streams, too, so that an exposure of 10⁹ edges costs no memory.
 
-use std::iter::Peekable;
-
 use crate::logic::Logic;
 use crate::netlist::NetId;
 use crate::units::{Frequency, Time};
@@ -27,33 +25,91 @@ impl Drive {
     }
 }
 
-/// A stream of drives in time order that can be looked ahead into.
-pub type Stimulus<'a> = Peekable<Box<dyn Iterator<Item = Drive> + Send + 'a>>;
+type Drives<'a> = Box<dyn Iterator<Item = Drive> + Send + 'a>;
 
-/// Makes a [`Stimulus`] of several time-ordered streams. Of drives at the same time, those of
-/// earlier streams come first.
-pub fn merge<'a>(
-    streams: impl IntoIterator<Item = Box<dyn Iterator<Item = Drive> + Send + 'a>>,
-) -> Stimulus<'a> {
-    let mut streams: Vec<Stimulus<'a>> = streams.into_iter().map(Iterator::peekable).collect();
-    let merged = std::iter::from_fn(move || {
-        let mut first: Option<(usize, Time)> = None;
-        for (i, stream) in streams.iter_mut().enumerate() {
-            if let Some(drive) = stream.peek()
-                && first.is_none_or(|(_, time)| drive.time < time)
-            {
-                first = Some((i, drive.time));
-            }
-        }
-        streams[first?.0].next()
-    });
-    (Box::new(merged) as Box<dyn Iterator<Item = Drive> + Send + 'a>).peekable()
+/// Drives of a netlist's inputs in time order, of which the kernel takes one after another.
+///
+/// ```
+/// use femtogate::kernel::{Drive, Stimulus, clock};
+/// use femtogate::netlist::NetId;
+/// use femtogate::units::{Frequency, Time};
+///
+/// let [reset, clk] = [0, 1].map(NetId::new);
+/// let release = [(0, true), (3, false)].map(|(ns, level)| Drive::new(Time::from_ns(ns), reset, level));
+/// // A clock is a stream, too: 20 half periods, and no memory for them.
+/// let ticks = clock(clk, Frequency::from_hz(500_000_000), Time::ZERO, 0, 20);
+/// let stimulus = Stimulus::sorted(release).with(ticks);
+/// let times: Vec<i64> = stimulus.map(|drive| drive.time.as_fs() / 1_000_000).collect();
+/// assert_eq!(times[..6], [0, 0, 1, 2, 3, 3]);
+/// ```
+pub struct Stimulus<'a> {
+    // No `Peekable`, which is bound to one lifetime for ever.
+    next: Option<Drive>,
+    later: Drives<'a>,
 }
 
-/// Makes a [`Stimulus`] of drives in any order; of drives at the same time, the first given comes first.
-pub fn in_order(mut drives: Vec<Drive>) -> Stimulus<'static> {
-    drives.sort_by_key(|drive| drive.time);
-    (Box::new(drives.into_iter()) as Box<dyn Iterator<Item = Drive> + Send>).peekable()
+impl<'a> Stimulus<'a> {
+    /// From drives that are in time order.
+    pub fn new(drives: impl IntoIterator<Item = Drive, IntoIter: Send + 'a>) -> Self {
+        let mut later: Drives<'a> = Box::new(drives.into_iter());
+        let next = later.next();
+        Stimulus { next, later }
+    }
+
+    /// From drives in any order; of drives at the same time, the first given comes first.
+    pub fn sorted(drives: impl IntoIterator<Item = Drive>) -> Self {
+        let mut drives: Vec<Drive> = drives.into_iter().collect();
+        drives.sort_by_key(|drive| drive.time);
+        Stimulus::new(drives)
+    }
+
+    /// Both together; `other` is in time order, too. Of drives at the same time, those that were here first come first.
+    #[must_use]
+    pub fn with(self, other: impl IntoIterator<Item = Drive, IntoIter: Send + 'a>) -> Self {
+        Stimulus::merge([self, Stimulus::new(other)])
+    }
+
+    /// Several together. Of drives at the same time, those of earlier ones come first.
+    pub fn merge(stimuli: impl IntoIterator<Item = Self>) -> Self {
+        let mut stimuli: Vec<Self> = stimuli.into_iter().collect();
+        Stimulus::new(std::iter::from_fn(move || {
+            let mut first: Option<(usize, Time)> = None;
+            for (index, stimulus) in stimuli.iter().enumerate() {
+                if let Some(drive) = stimulus.peek()
+                    && first.is_none_or(|(_, time)| drive.time < time)
+                {
+                    first = Some((index, drive.time));
+                }
+            }
+            stimuli[first?.0].next()
+        }))
+    }
+
+    /// The next drive, which stays the next one.
+    #[inline]
+    pub fn peek(&self) -> Option<&Drive> {
+        self.next.as_ref()
+    }
+
+    /// The next drive, if it is not after `time`.
+    #[inline]
+    pub(super) fn next_until(&mut self, time: Time) -> Option<Drive> {
+        match self.next {
+            Some(drive) if drive.time <= time => self.next(),
+            _ => None,
+        }
+    }
+}
+
+impl Iterator for Stimulus<'_> {
+    type Item = Drive;
+
+    #[inline]
+    fn next(&mut self) -> Option<Drive> {
+        let next = self.next?;
+        self.next = self.later.next();
+        Some(next)
+    }
 }
 
 /// A clock's edges for half periods `first..end` counted from `origin`: even ones fall, odd ones
@@ -78,14 +134,12 @@ mod tests {
     fn streams_merge_in_time_order_and_ties_in_stream_order() {
         let net = NetId::new;
         let at = |fs, n, v| Drive::new(Time::from_fs(fs), net(n), v);
-        let a = vec![at(0, 0, true), at(5, 0, false)];
-        let b = vec![at(0, 1, true), at(3, 1, false)];
-        let merged: Vec<_> = merge([
-            Box::new(a.into_iter()) as Box<dyn Iterator<Item = Drive> + Send>,
-            Box::new(b.into_iter()),
-        ])
-        .map(|d| (d.time.as_fs(), d.net.index()))
-        .collect();
+        let a = [at(0, 0, true), at(5, 0, false)];
+        let b = [at(0, 1, true), at(3, 1, false)];
+        let merged: Vec<_> = Stimulus::new(a)
+            .with(b)
+            .map(|d| (d.time.as_fs(), d.net.index()))
+            .collect();
         assert_eq!(merged, [(0, 0), (0, 1), (3, 1), (5, 0)]);
     }
 

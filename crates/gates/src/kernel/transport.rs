@@ -100,8 +100,7 @@ pub(super) fn transport_nets(netlist: &Netlist, timing: &Timing) -> impl Iterato
     let cells = netlist.cells().iter().enumerate();
     cells
         .filter(|(index, _)| timing.model(*index) == DelayModel::Transport)
-        .flat_map(|(_, cell)| cell.outputs)
-        .filter(|net| net.is_some())
+        .flat_map(|(_, cell)| cell.output_nets())
         .map(|net| net.index())
 }
 
@@ -120,7 +119,7 @@ mod tests {
         let a = m.input("A");
         m.gate(CellKind::Buf, &[a]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         timing.set_model(0, DelayModel::Transport);
         let queues = TransportQueues::new(&netlist, &timing);
         let net = queues.nets().next().unwrap();

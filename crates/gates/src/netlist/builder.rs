@@ -150,8 +150,14 @@ impl ModuleBuilder {
         wanted == got
     }
 
-    /// Places a cell with its nets in pin order; outputs may be [`Net::NONE`].
-    pub fn cell(&mut self, name: &str, kind: CellKind, inputs: &[Net], outputs: &[Net]) {
+    /// Places a cell with its nets in pin order. Outputs are nets, or options of nets where one is left open.
+    pub fn cell<N: Into<Option<Net>> + Copy>(
+        &mut self,
+        name: &str,
+        kind: CellKind,
+        inputs: &[Net],
+        outputs: &[N],
+    ) {
         let what = |side| move || format!("cell {name} ({} {side})", kind.name());
         if !self.check_width(what("inputs"), kind.inputs().len(), inputs.len())
             || !self.check_width(what("outputs"), kind.outputs().len(), outputs.len())
@@ -161,25 +167,29 @@ impl ModuleBuilder {
         let mut cell = Cell {
             name: name.to_owned(),
             kind,
-            inputs: [Net::NONE; MAX_INPUTS],
-            outputs: [Net::NONE; MAX_OUTPUTS],
+            inputs: [None; MAX_INPUTS],
+            outputs: [None; MAX_OUTPUTS],
             own_delay: None,
         };
-        cell.inputs[..inputs.len()].copy_from_slice(inputs);
-        cell.outputs[..outputs.len()].copy_from_slice(outputs);
-        for &net in outputs.iter().filter(|n| n.is_some()) {
+        for (pin, &net) in cell.inputs.iter_mut().zip(inputs) {
+            *pin = Some(net);
+        }
+        for (pin, &net) in cell.outputs.iter_mut().zip(outputs) {
+            *pin = net.into();
+        }
+        for net in cell.outputs.into_iter().flatten() {
             self.drive(net, || format!("cell {name}"));
         }
         self.module.cells.push(cell);
     }
 
     /// Places a cell with a delay of its own.
-    pub fn cell_with_delay(
+    pub fn cell_with_delay<N: Into<Option<Net>> + Copy>(
         &mut self,
         name: &str,
         kind: CellKind,
         inputs: &[Net],
-        outputs: &[Net],
+        outputs: &[N],
         delay: OwnDelay,
     ) {
         self.cell(name, kind, inputs, outputs);
@@ -207,7 +217,7 @@ impl ModuleBuilder {
     }
 
     /// A new net without a name of its own.
-    pub(super) fn unnamed(&mut self) -> Net {
+    pub(crate) fn unnamed(&mut self) -> Net {
         let name = format!("n{}", self.module.net_count);
         self.declare(name, 1, false, false)[0]
     }
@@ -231,9 +241,22 @@ impl ModuleBuilder {
         level[0]
     }
 
-    /// Instantiates `module`, connecting ports by name. Outputs may be left out,
-    /// and bits of them may be [`Net::NONE`].
+    /// Instantiates `module`, connecting ports by name. Outputs may be left out.
     pub fn instance(&mut self, name: &str, module: &Arc<Module>, ports: &[(&str, &[Net])]) {
+        let ports: Vec<(&str, Vec<Option<Net>>)> = ports
+            .iter()
+            .map(|(port, nets)| (*port, nets.iter().copied().map(Some).collect()))
+            .collect();
+        self.instance_with_open_bits(name, module, &ports);
+    }
+
+    /// Instantiates `module` as [`ModuleBuilder::instance`] does, where single bits of outputs may be left open, too.
+    pub fn instance_with_open_bits(
+        &mut self,
+        name: &str,
+        module: &Arc<Module>,
+        ports: &[(&str, Vec<Option<Net>>)],
+    ) {
         let mut connections = Vec::new();
         let problem = |port: &str, problem| NetlistError::PortMismatch {
             module: String::new(),
@@ -252,23 +275,19 @@ impl ModuleBuilder {
                 Some((_, nets)) => {
                     let what = || format!("port {} of instance {name}", signal.name);
                     if self.check_width(what, signal.width(), nets.len()) {
-                        let is_open = !nets.iter().any(|n| n.is_some());
-                        for &net in *nets {
+                        let is_open = nets.iter().all(Option::is_none);
+                        for &net in nets {
                             // Verilog can leave open a port as a whole, but no bit of it.
-                            let net = if net.is_some() || is_open {
-                                net
-                            } else {
-                                self.unnamed()
-                            };
+                            let net = net.or_else(|| (!is_open).then(|| self.unnamed()));
                             connections.push(net);
-                            if direction == Direction::Output && net.is_some() {
+                            if let (Direction::Output, Some(net)) = (direction, net) {
                                 self.drive(net, || format!("instance {name}"));
                             }
                         }
                     }
                 }
                 None if direction == Direction::Output => {
-                    connections.extend(signal.nets().map(|_| Net::NONE));
+                    connections.extend(signal.nets().map(|_| None));
                 }
                 None => errors.push(problem(&signal.name, "leaves open input")),
             }
@@ -360,7 +379,7 @@ impl ModuleBuilder {
     }
 }
 
-pub(super) fn is_identifier(name: &str) -> bool {
+pub(crate) fn is_identifier(name: &str) -> bool {
     let mut bytes = name.bytes();
     bytes
         .next()
@@ -443,7 +462,7 @@ mod tests {
         let (a, c, z) = (m.input("A"), m.input("C"), m.output("Z"));
         m.instance_by_names("u", &leaf, &[("B", &[c])]);
         let top = m.finish().unwrap();
-        assert_eq!(top.instances()[0].connections, [a, c, z]);
+        assert_eq!(top.instances()[0].connections, [a, c, z].map(Some));
 
         let mut m = ModuleBuilder::new("top");
         m.input("A");

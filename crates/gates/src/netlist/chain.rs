@@ -33,7 +33,7 @@ pub struct Chain {
 
 impl Chain {
     /// The chain that a cell is; none where it delays as gates do.
-    pub(super) fn of(kind: CellKind, own: Option<OwnDelay>) -> Option<Self> {
+    pub(crate) fn of(kind: CellKind, own: Option<OwnDelay>) -> Option<Self> {
         let own = own.filter(|own| own.model == DelayModel::Transport)?;
         debug_assert_eq!(kind, CellKind::Buf, "only wires have transport delays");
         let sigma = own.spread.map_or(0.0, |spread| spread.sigma);
@@ -45,7 +45,7 @@ impl Chain {
     }
 
     /// The chain that a cell of a netlist is.
-    pub(super) fn of_cell(netlist: &Netlist, cell: usize) -> Option<Self> {
+    pub(crate) fn of_cell(netlist: &Netlist, cell: usize) -> Option<Self> {
         let own = netlist.own_delays();
         let at = own.binary_search_by_key(&cell, |own| own.0).ok()?;
         Chain::of(netlist.cells()[cell].kind, Some(own[at].1))
@@ -59,22 +59,22 @@ impl Chain {
     }
 
     /// Name of its module in Verilog.
-    pub(super) fn module(self) -> String {
+    pub(crate) fn module(self) -> String {
         format!("DELAY_{}_{}", self.typical_fs, self.stages)
     }
 
     /// Name of its stages' module in Verilog and SDF.
-    pub(super) fn stage_module(self) -> String {
+    pub(crate) fn stage_module(self) -> String {
         format!("STAGE_{}_{}", self.typical_fs, self.stages)
     }
 
     /// Name of one of its stages.
-    pub(super) fn stage(number: usize) -> String {
+    pub(crate) fn stage(number: usize) -> String {
         format!("s{number}")
     }
 
     /// The stage of a chain at a dotted path: its cell, and its number.
-    pub(super) fn find(netlist: &Netlist, path: &str) -> Option<(usize, Self, usize)> {
+    pub(crate) fn find(netlist: &Netlist, path: &str) -> Option<(usize, Self, usize)> {
         let (element, stage) = path.rsplit_once('.')?;
         let cell = netlist.cell(element)?;
         let chain = Chain::of_cell(netlist, cell)?;
@@ -83,7 +83,7 @@ impl Chain {
     }
 
     /// Parts of a delay, one for each stage.
-    pub(super) fn parts(self, fs: u32) -> impl Iterator<Item = u32> {
+    pub(crate) fn parts(self, fs: u32) -> impl Iterator<Item = u32> {
         let stages = self.stages as u64;
         let until = move |stage: u64| u64::from(fs) * stage / stages;
         (0..stages).map(move |stage| (until(stage + 1) - until(stage)) as u32)

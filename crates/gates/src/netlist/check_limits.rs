@@ -243,7 +243,7 @@ mod tests {
     /// A flip-flop that drives its own D (a toggle) or its neighbour's (a shift register) holds by construction.
     #[test]
     fn hold_is_shorter_than_clock_to_q_in_every_corner() {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         for kind in CellKind::ALL.into_iter().filter(|k| k.is_flip_flop()) {
             for corner in Corner::ALL {
                 let clock_to_q = library.delay(kind, 1, Logic::One, corner).as_fs();

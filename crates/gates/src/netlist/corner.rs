@@ -131,7 +131,7 @@ impl Edge {
         }
     }
 
-    pub(super) const fn opposite(self) -> Self {
+    pub(crate) const fn opposite(self) -> Self {
         match self {
             Edge::Rise => Edge::Fall,
             Edge::Fall => Edge::Rise,

@@ -4,6 +4,7 @@
 //! module's local nets to the chip's nets. Names are stored in the modules alone: a path is followed from module to
 //! module, one hash look-up for each name in it.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
@@ -12,25 +13,22 @@ use super::own_delay::OwnDelay;
 
 /// A net of the elaborated chip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct NetId(u32);
+pub struct NetId(
+    // One more than its index, so that an `Option` of it takes no more memory.
+    NonZeroU32,
+);
 
 impl NetId {
-    /// Marks an unconnected pin.
-    pub const NONE: NetId = NetId(u32::MAX);
-
     /// From an index.
+    #[inline]
     pub const fn new(index: usize) -> Self {
-        NetId(index as u32)
+        NetId(NonZeroU32::MIN.saturating_add(index as u32))
     }
 
     /// Index into per-net arrays.
+    #[inline]
     pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    /// Whether this is a net at all.
-    pub const fn is_some(self) -> bool {
-        self.0 != u32::MAX
+        (self.0.get() - 1) as usize
     }
 }
 
@@ -39,10 +37,31 @@ impl NetId {
 pub struct FlatCell {
     /// Which cell of the library.
     pub kind: CellKind,
-    /// Input nets in pin order, padded with [`NetId::NONE`].
-    pub inputs: [NetId; MAX_INPUTS],
+    /// Input nets in pin order; the kind's pins are all connected, and those that it does not have are none.
+    pub inputs: [Option<NetId>; MAX_INPUTS],
     /// Output nets in pin order.
-    pub outputs: [NetId; MAX_OUTPUTS],
+    pub outputs: [Option<NetId>; MAX_OUTPUTS],
+}
+
+impl FlatCell {
+    /// The net at an input pin.
+    ///
+    /// # Panics
+    /// When the cell's kind has no such pin.
+    #[inline]
+    pub fn input(&self, pin: usize) -> NetId {
+        self.inputs[pin].expect("a pin of the cell")
+    }
+
+    /// Input nets in pin order.
+    pub fn input_nets(&self) -> impl Iterator<Item = NetId> + use<> {
+        self.inputs.into_iter().flatten()
+    }
+
+    /// Output nets in pin order, without those that are open.
+    pub fn output_nets(&self) -> impl Iterator<Item = NetId> + use<> {
+        self.outputs.into_iter().flatten()
+    }
 }
 
 /// One instance in the hierarchy.
@@ -83,10 +102,10 @@ impl Netlist {
             net_map: Vec::new(),
             own_delays: Vec::new(),
         };
-        let ports: Vec<NetId> = top
+        let ports: Vec<_> = top
             .port_signals()
             .flat_map(|(_, s)| s.nets())
-            .map(|_| netlist.new_net())
+            .map(|_| Some(netlist.new_net()))
             .collect();
         netlist.stamp(top, top.name(), 0, &ports);
         netlist
@@ -101,29 +120,22 @@ impl Netlist {
         NetId::new(self.net_count - 1)
     }
 
-    fn stamp(&mut self, module: &Arc<Module>, name: &str, parent: usize, ports: &[NetId]) {
+    fn stamp(&mut self, module: &Arc<Module>, name: &str, parent: usize, ports: &[Option<NetId>]) {
         let index = self.scopes.len();
         let first_net = self.net_map.len();
-        self.net_map
-            .resize(first_net + module.net_count(), NetId::NONE);
+        let mut nets = vec![None; module.net_count()];
         let port_nets = module.port_signals().flat_map(|(_, s)| s.nets());
         for (local, &outer) in port_nets.zip(ports) {
-            self.net_map[first_net + local.index()] = outer;
+            nets[local.index()] = outer;
         }
         let first_own_net = self.net_count;
-        for i in first_net..self.net_map.len() {
-            if !self.net_map[i].is_some() {
-                self.net_map[i] = self.new_net();
-            }
+        for net in nets {
+            let net = net.unwrap_or_else(|| self.new_net());
+            self.net_map.push(net);
         }
         let first_cell = self.cells.len();
-        let global = |net_map: &[NetId], net: Net| {
-            if net.is_some() {
-                net_map[first_net + net.index()]
-            } else {
-                NetId::NONE
-            }
-        };
+        let global =
+            |net_map: &[NetId], net: Option<Net>| net.map(|net| net_map[first_net + net.index()]);
         for cell in module.cells() {
             let flat = FlatCell {
                 kind: cell.kind,

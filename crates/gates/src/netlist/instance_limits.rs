@@ -18,12 +18,12 @@ pub struct InstanceLimits([[[u32; 2]; CheckKind::ALL.len()]; 2]);
 
 impl InstanceLimits {
     /// Limits that everything keeps.
-    pub(super) const fn none() -> Self {
+    pub(crate) const fn none() -> Self {
         InstanceLimits([[[0; 2]; CheckKind::ALL.len()]; 2])
     }
 
     /// The larger of each limit.
-    pub(super) fn larger(self, other: &Self) -> Self {
+    pub(crate) fn larger(self, other: &Self) -> Self {
         let mut larger = self;
         let (all, others) = (larger.0.as_flattened_mut(), other.0.as_flattened());
         let (all, others) = (all.as_flattened_mut(), others.as_flattened());
@@ -34,7 +34,7 @@ impl InstanceLimits {
     }
 
     /// Limits of one flip-flop as those of its kind, the same in every corner; of set and reset the larger.
-    pub(super) fn of_kind(&self) -> CheckLimits {
+    pub(crate) fn of_kind(&self) -> CheckLimits {
         let of = |check, edge| {
             let controls = [Control::Reset, Control::Set];
             let limits = controls.map(|control| self.at(control, check, edge));

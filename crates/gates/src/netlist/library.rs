@@ -36,7 +36,7 @@ impl TimingArc {
     }
 
     /// The same in every corner.
-    pub(super) const fn fixed(delay: ArcDelay) -> Self {
+    pub(crate) const fn fixed(delay: ArcDelay) -> Self {
         TimingArc {
             rise: Delay::fixed(delay.rise_fs),
             fall: Delay::fixed(delay.fall_fs),
@@ -65,9 +65,12 @@ pub struct Library {
     checks: [CheckLimits; CellKind::ALL.len()],
 }
 
-impl Default for Library {
-    /// The library described at the head of this file.
-    fn default() -> Self {
+impl Library {
+    /// An invented library that stands for a 40 nm logic process at 1.1 V and 50 °C with extracted wiring. No foundry's numbers
+    /// are in it: its delays are chosen so that a ripple counter of nine programmable bits takes 1.2 ns.
+    ///
+    /// Delays of a real library come from its Liberty file: [`Liberty::timing`](crate::liberty::Liberty::timing).
+    pub fn generic_40nm() -> Self {
         /// To every output alike.
         const fn arcs(rise_fs: u32, fall_fs: u32) -> [TimingArc; MAX_OUTPUTS] {
             [TimingArc::scaled(rise_fs, fall_fs); MAX_OUTPUTS]
@@ -100,16 +103,14 @@ impl Default for Library {
         let checks = CellKind::ALL.map(CheckLimits::of);
         Library { cells, checks }
     }
-}
 
-impl Library {
     /// Arcs of one cell.
     pub fn arcs(&self, kind: CellKind) -> &CellArcs {
         &self.cells[kind as usize]
     }
 
     /// Delays of one cell in a corner.
-    pub(super) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
+    pub(crate) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
         let arc = |arc: TimingArc| ArcDelay {
             rise_fs: arc.rise.at(corner),
             fall_fs: arc.fall.at(corner),
@@ -144,7 +145,7 @@ mod tests {
 
     #[test]
     fn corners_are_ordered() {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         for kind in CellKind::ALL {
             for pin in 0..kind.inputs().len() {
                 let [min, typ, max] = Corner::ALL.map(|c| library.delay(kind, pin, Logic::One, c));

@@ -18,20 +18,17 @@ mod delay;
 mod error;
 mod flat;
 mod instance_limits;
-pub mod liberty;
 mod library;
 mod mismatch;
 mod module;
 mod own_delay;
 mod requirements;
-pub mod sdf;
 mod static_timing;
 mod timing;
 mod variation;
-mod verilog;
-mod yosys;
 
 pub use builder::ModuleBuilder;
+pub(crate) use builder::is_identifier;
 pub(crate) use cell::next_state;
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 pub use chain::Chain;
@@ -50,7 +47,3 @@ pub use static_timing::caused;
 pub use static_timing::{Arrivals, Bound, Path, StaticTiming, Step, TimingLoop};
 pub use timing::Timing;
 pub use variation::{Conditions, derated_limits, varied, varied_as};
-pub use verilog::{
-    write_cells, write_delays, write_modules, write_parametric_cells, write_standard_cells,
-};
-pub use yosys::YosysError;

@@ -13,17 +13,9 @@ use super::own_delay::OwnDelay;
 pub struct Net(pub(super) u32);
 
 impl Net {
-    /// Marks an output pin that drives nothing.
-    pub const NONE: Net = Net(u32::MAX);
-
     /// Index into the module's nets.
     pub(crate) const fn index(self) -> usize {
         self.0 as usize
-    }
-
-    /// Whether this is a net at all (and not [`Net::NONE`]).
-    pub const fn is_some(self) -> bool {
-        self.0 != u32::MAX
     }
 }
 
@@ -77,10 +69,10 @@ pub struct Cell {
     pub name: String,
     /// Which cell of the library.
     pub kind: CellKind,
-    /// Input nets in pin order, padded with [`Net::NONE`].
-    pub inputs: [Net; MAX_INPUTS],
-    /// Output nets in pin order, [`Net::NONE`] where unconnected.
-    pub outputs: [Net; MAX_OUTPUTS],
+    /// Input nets in pin order; the kind's pins are all connected, and those that it does not have are none.
+    pub inputs: [Option<Net>; MAX_INPUTS],
+    /// Output nets in pin order.
+    pub outputs: [Option<Net>; MAX_OUTPUTS],
     /// A delay that is the cell's own, instead of the library's.
     pub own_delay: Option<OwnDelay>,
 }
@@ -93,7 +85,7 @@ pub struct Instance {
     /// What is instantiated.
     pub module: Arc<Module>,
     /// The parent's nets for every port bit of the child: ports in order, bit 0 first.
-    pub connections: Vec<Net>,
+    pub connections: Vec<Option<Net>>,
 }
 
 /// A finished circuit description.
@@ -130,7 +122,7 @@ impl Module {
 
 impl Names {
     /// The names of a complete module.
-    pub(super) fn of(module: &Module) -> Self {
+    pub(crate) fn of(module: &Module) -> Self {
         let index = |i: usize| i as u32;
         let mut scopes = 1;
         let mut instances = HashMap::with_capacity(module.instances.len());
@@ -198,7 +190,7 @@ impl Module {
     }
 
     /// How many scopes after this module's the one of its instance `name` comes in an elaborated design.
-    pub(super) fn scope_offset(&self, name: &str) -> Option<usize> {
+    pub(crate) fn scope_offset(&self, name: &str) -> Option<usize> {
         let offset = self.names.instances.get(name)?;
         Some(*offset as usize)
     }
@@ -236,7 +228,7 @@ impl Module {
 
 #[cfg(test)]
 mod tests {
-    use crate::netlist::{CellKind, ModuleBuilder, Net};
+    use crate::netlist::{CellKind, ModuleBuilder};
 
     #[test]
     fn a_module_is_as_large_as_its_cells_and_what_is_below() {
@@ -244,7 +236,7 @@ mod tests {
         let (a, z) = (m.input("A"), m.output("Z"));
         m.gate_into(CellKind::Inv, &[a], z);
         let q = m.wire("q");
-        m.cell("ff", CellKind::Dffr, &[z, a, a], &[q, Net::NONE]);
+        m.cell("ff", CellKind::Dffr, &[z, a, a], &[Some(q), None]);
         let leaf = m.finish().expect("a leaf");
         let of = |area: fn(CellKind) -> u32| {
             [CellKind::Inv, CellKind::Dffr, CellKind::Xor2].map(|kind| u64::from(area(kind)))

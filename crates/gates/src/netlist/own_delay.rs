@@ -44,7 +44,7 @@ impl OwnDelay {
     }
 
     /// The delays of the cell at this dotted path, in a corner.
-    pub(super) fn delays(&self, path: impl FnOnce() -> String, corner: Corner) -> CellDelays {
+    pub(crate) fn delays(&self, path: impl FnOnce() -> String, corner: Corner) -> CellDelays {
         // A spread is that of the element, whatever it is made of: of an inverter's size in the law of areas.
         let own = self.spread.map_or(1.0, |spread| spread.factor(&path(), 2));
         let typical_fs = (f64::from(self.typical_fs) * own).round() as u32;

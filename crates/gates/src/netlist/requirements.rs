@@ -130,7 +130,8 @@ impl<'n> Requirements<'n> {
     fn add(&mut self, cell: usize, kind: CellKind, library: &Library, corner: Corner) {
         let limits = library.checks(kind);
         let limit = |check, edge| Time::from_fs(limits.toward(check, edge, corner).into());
-        let [data, clock, ..] = self.netlist.cells()[cell].inputs;
+        let leaf = &self.netlist.cells()[cell];
+        let (data, clock) = (leaf.input(0), leaf.input(1));
         for launch in Edge::BOTH {
             for capture in Edge::BOTH {
                 let same = launch == capture;
@@ -193,7 +194,8 @@ impl<'n> Requirements<'n> {
 
     /// The paths that a requirement is about: of the data (or the pulse's begin), and of the clock (or its end).
     pub fn paths(&self, requirement: &Requirement) -> Option<(Path, Path)> {
-        let [data, clock, ..] = self.netlist.cells()[requirement.cell].inputs;
+        let leaf = &self.netlist.cells()[requirement.cell];
+        let (data, clock) = (leaf.input(0), leaf.input(1));
         let path =
             |after: Edge, net, edge, bound| self.arrivals[after as usize].path(net, edge, bound);
         let (launch, capture) = (requirement.launch, requirement.capture);
@@ -219,27 +221,32 @@ impl<'n> Requirements<'n> {
 mod tests {
     use super::*;
     use crate::logic::Logic;
-    use crate::netlist::{ModuleBuilder, Net, Timing};
+    use crate::netlist::{ModuleBuilder, Timing};
 
     /// A flip-flop behind an inverter, captured by the same clock or by its inverse.
     fn pair(inverted: bool) -> Netlist {
         let mut m = ModuleBuilder::new("pair");
         let (d, ck, r) = (m.input("D"), m.input("CK"), m.input("R"));
         let (q, z) = (m.wire("Q"), m.output("Z"));
-        m.cell("first", CellKind::Dffr, &[d, ck, r], &[q, Net::NONE]);
+        m.cell("first", CellKind::Dffr, &[d, ck, r], &[Some(q), None]);
         let data = m.gate(CellKind::Inv, &[q]);
         let clock = if inverted {
             m.gate(CellKind::Inv, &[ck])
         } else {
             ck
         };
-        m.cell("second", CellKind::Dffr, &[data, clock, r], &[z, Net::NONE]);
+        m.cell(
+            "second",
+            CellKind::Dffr,
+            &[data, clock, r],
+            &[Some(z), None],
+        );
         Netlist::elaborate(&m.finish().unwrap())
     }
 
     /// Longest need of one check of the second flip-flop, with its half periods.
     fn need(inverted: bool, kind: CheckKind) -> (i64, Time) {
-        let (netlist, library) = (pair(inverted), Library::default());
+        let (netlist, library) = (pair(inverted), Library::generic_40nm());
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();
@@ -254,7 +261,7 @@ mod tests {
 
     #[test]
     fn data_have_a_period_to_the_same_edge_and_half_of_one_to_the_opposite() {
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let delay = |kind, pin, to| library.delay(kind, pin, to, Corner::Typ);
         let clock_to_q = delay(CellKind::Dffr, 1, Logic::One);
         let (rise, fall) = (
@@ -281,7 +288,10 @@ mod tests {
         let (ck, r, q) = (m.input("CK"), m.input("R"), m.output("Q"));
         let qn = m.wire("QN");
         m.cell("bit", CellKind::Dffr, &[qn, ck, r], &[q, qn]);
-        let (netlist, library) = (Netlist::elaborate(&m.finish().unwrap()), Library::default());
+        let (netlist, library) = (
+            Netlist::elaborate(&m.finish().unwrap()),
+            Library::generic_40nm(),
+        );
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();

@@ -60,7 +60,7 @@ impl Timing {
 
     /// Gives the cells from `first` on the delays and limits of a block's, which is of as many cells. `known` is what this gave
     /// for the same block before: its sets are shared.
-    pub(super) fn adopt(&mut self, first: usize, block: &Timing, known: Option<u32>) -> u32 {
+    pub(crate) fn adopt(&mut self, first: usize, block: &Timing, known: Option<u32>) -> u32 {
         let base = known.unwrap_or_else(|| {
             let base = self.sets.len() as u32;
             self.sets.extend(&block.sets);
@@ -187,7 +187,7 @@ mod tests {
         let b = m.gate(CellKind::Inv, &[a]);
         m.gate(CellKind::Inv, &[b]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let nominal = *timing.of(0);
         let slow = [[ArcDelay {
             rise_fs: 9,

@@ -136,7 +136,7 @@ pub fn varied_as(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::netlist::{ModuleBuilder, Net};
+    use crate::netlist::ModuleBuilder;
 
     fn factor(process: Corner, voltage_v: f64, temperature_c: f64) -> f64 {
         let conditions = Conditions {
@@ -191,9 +191,9 @@ mod tests {
         let pins = CellKind::Dffr.inputs().iter().map(|pin| m.input(pin));
         let pins: Vec<_> = pins.collect();
         let q = m.output("Q");
-        m.cell("flip_flop", CellKind::Dffr, &pins, &[q, Net::NONE]);
+        m.cell("flip_flop", CellKind::Dffr, &pins, &[Some(q), None]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let library = Library::default();
+        let library = Library::generic_40nm();
         let of = |library: &Library| Timing::nominal(&netlist, library, Corner::Typ);
         let (slow, derated) = (
             varied(&netlist, &of(&library), 1.5, None),

@@ -17,16 +17,19 @@ impl Time {
     pub const MAX: Time = Time(i64::MAX);
 
     /// From femtoseconds.
+    #[inline]
     pub const fn from_fs(fs: i64) -> Self {
         Time(fs)
     }
 
     /// From picoseconds.
+    #[inline]
     pub const fn from_ps(ps: i64) -> Self {
         Time(ps * 1_000)
     }
 
     /// From nanoseconds.
+    #[inline]
     pub const fn from_ns(ns: i64) -> Self {
         Time(ns * 1_000_000)
     }
@@ -37,6 +40,7 @@ impl Time {
     }
 
     /// In femtoseconds.
+    #[inline]
     pub const fn as_fs(self) -> i64 {
         self.0
     }
@@ -54,12 +58,14 @@ impl Time {
 
 impl Add for Time {
     type Output = Time;
+    #[inline]
     fn add(self, rhs: Time) -> Time {
         Time(self.0 + rhs.0)
     }
 }
 
 impl AddAssign for Time {
+    #[inline]
     fn add_assign(&mut self, rhs: Time) {
         self.0 += rhs.0;
     }
@@ -67,6 +73,7 @@ impl AddAssign for Time {
 
 impl Sub for Time {
     type Output = Time;
+    #[inline]
     fn sub(self, rhs: Time) -> Time {
         Time(self.0 - rhs.0)
     }
@@ -74,6 +81,7 @@ impl Sub for Time {
 
 impl Neg for Time {
     type Output = Time;
+    #[inline]
     fn neg(self) -> Time {
         Time(-self.0)
     }
@@ -81,6 +89,7 @@ impl Neg for Time {
 
 impl Mul<i64> for Time {
     type Output = Time;
+    #[inline]
     fn mul(self, rhs: i64) -> Time {
         Time(self.0 * rhs)
     }

@@ -34,10 +34,23 @@ impl<W: Read + Write + Seek> FstWriter<W> {
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
     pub fn new(out: W, netlist: &Netlist, selection: &Selection) -> io::Result<Self> {
+        Self::with_origin(out, netlist, selection, Origin::default())
+    }
+
+    /// The same, with another program named as the file's writer.
+    ///
+    /// # Errors
+    /// As [`FstWriter::new`].
+    pub fn with_origin(
+        out: W,
+        netlist: &Netlist,
+        selection: &Selection,
+        origin: Origin,
+    ) -> io::Result<Self> {
         let info = FstInfo {
             start_time: 0,
             timescale_exponent: -15,
-            version: Origin::of_files().vendor_and_version(),
+            version: origin.vendor_and_version(),
             date: String::new(),
             file_type: FstFileType::Verilog,
         };
@@ -53,7 +66,6 @@ impl<W: Read + Write + Seek> FstWriter<W> {
             full: body.size() + BLOCK,
             body,
             ids: header.ids,
-            values: Vec::new(),
             start: Time::ZERO,
             stamped: Time::ZERO,
             error: None,
@@ -66,8 +78,6 @@ impl<W: Read + Write + Seek> FstWriter<W> {
 pub struct Fst<W: Write + Seek> {
     body: FstBodyWriter<W>,
     ids: Vec<FstSignalId>,
-    /// Values of one bus.
-    values: Vec<u8>,
     /// Size of `body` at which its block is complete.
     full: usize,
     start: Time,
@@ -146,11 +156,9 @@ impl<W: Read + Write + Seek> Format for Fst<W> {
     }
 
     #[inline]
-    fn bus(&mut self, variable: u32, values: impl ExactSizeIterator<Item = u8>) {
-        self.values.clear();
-        self.values.extend(values);
+    fn bus(&mut self, variable: u32, values: &[u8]) {
         let id = self.ids[variable as usize];
-        let changed = self.body.signal_change(id, &self.values);
+        let changed = self.body.signal_change(id, values);
         self.keep_error(changed);
     }
 

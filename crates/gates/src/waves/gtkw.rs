@@ -40,31 +40,32 @@ impl Radix {
 
 impl Layout {
     /// Writes the save file for the waveform `file`, a file name relative to where the save file
-    /// will be.
+    /// will be. `origin` is the program that it names as its writer.
     ///
     /// # Errors
     /// Those of `out`; and, before anything is written: a signal that `netlist` has not; a title or file name of several lines.
-    pub fn write_gtkw(&self, out: &mut dyn Write, netlist: &Netlist, file: &str) -> io::Result<()> {
-        let text = self.gtkw(netlist, file)?;
+    pub fn write_gtkw(
+        &self,
+        out: &mut dyn Write,
+        netlist: &Netlist,
+        file: &str,
+        origin: Origin,
+    ) -> io::Result<()> {
+        let text = self.gtkw(netlist, file, origin)?;
         out.write_all(&text)
     }
 
-    /// What save files written here begin with. Those that GTKWave writes begin otherwise.
-    pub fn gtkw_signature() -> String {
-        format!("[*] {}", Origin::of_files().vendor)
+    /// What save files of this origin begin with. Those that GTKWave writes begin otherwise.
+    pub fn gtkw_signature(origin: Origin) -> String {
+        format!("[*] {}", origin.vendor)
     }
 
-    fn gtkw(&self, netlist: &Netlist, file: &str) -> io::Result<Vec<u8>> {
+    fn gtkw(&self, netlist: &Netlist, file: &str, origin: Origin) -> io::Result<Vec<u8>> {
         one_line(file)?;
         let names_width = self.names_width(netlist)?;
         let top = &netlist.scopes()[0].name;
         let mut out = Vec::new();
-        writeln!(
-            out,
-            "{} {}",
-            Self::gtkw_signature(),
-            Origin::of_files().version
-        )?;
+        writeln!(out, "{} {}", Self::gtkw_signature(origin), origin.version)?;
         writeln!(out, "[dumpfile] \"{file}\"")?;
         // GTKWave looks for the dump from its own working folder, unless a name of the save file
         // (any name) tells it that the dump's is relative to where it found the save file.
@@ -145,7 +146,7 @@ mod tests {
 
     fn save(groups: Vec<Group>) -> io::Result<String> {
         let mut text = Vec::new();
-        layout(groups).write_gtkw(&mut text, &netlist(), "x.vcd")?;
+        layout(groups).write_gtkw(&mut text, &netlist(), "x.vcd", Origin::default())?;
         Ok(String::from_utf8(text).unwrap())
     }
 

@@ -11,7 +11,7 @@
 //! Two runs of the same simulation write the same bytes: files carry no date.
 //!
 //! ```
-//! use femtogate::kernel::{Drive, Kernel};
+//! use femtogate::kernel::{Drive, Kernel, Stimulus};
 //! use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
 //! use femtogate::units::Time;
 //! use femtogate::waves::{Selection, VcdWriter};
@@ -22,14 +22,14 @@
 //! let netlist = Netlist::elaborate(&m.finish().unwrap());
 //!
 //! let mut waves = VcdWriter::new(Vec::new(), &netlist, &Selection::all())?;
-//! let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+//! let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
 //! let mut kernel = Kernel::new(&netlist, &timing);
 //! let drives = [Drive::new(Time::from_ns(1), netlist.net("A").unwrap(), true)];
-//! let mut stimulus = femtogate::kernel::merge([Box::new(drives.into_iter()) as Box<_>]);
-//! kernel.run(&mut stimulus, Time::from_ns(2), &mut waves);
+//! let mut stimulus = Stimulus::new(drives);
+//! kernel.run(&mut stimulus, Time::from_ns(2), &mut waves)?;
 //! let text = String::from_utf8(waves.finish(kernel.now())?).unwrap();
 //! assert!(text.ends_with("#1000000\n1!\n#1018979\n0\"\n#2000000\n"));
-//! # Ok::<(), std::io::Error>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod fst;

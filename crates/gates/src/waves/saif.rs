@@ -17,7 +17,8 @@ use crate::kernel::NetActivity;
 use crate::netlist::Netlist;
 use crate::units::Time;
 
-/// Writes what `nets` did, by net of `netlist`, in `duration`; TG only with `transport_glitches`.
+/// Writes what `nets` did, by net of `netlist`, in `duration`; TG only with `transport_glitches`. `origin` is the program that the
+/// file names as its writer.
 ///
 /// # Errors
 /// Those of `out`.
@@ -27,13 +28,13 @@ pub fn write_saif(
     nets: &[NetActivity],
     duration: Time,
     transport_glitches: bool,
+    origin: Origin,
 ) -> io::Result<()> {
     let top = &netlist.scopes()[0].name;
     writeln!(out, "(SAIFILE")?;
     writeln!(out, "(SAIFVERSION \"2.0\")")?;
     writeln!(out, "(DIRECTION \"backward\")")?;
     writeln!(out, "(DESIGN \"{top}\")")?;
-    let origin = Origin::of_files();
     writeln!(out, "(VENDOR \"{}\")", origin.vendor)?;
     writeln!(out, "(PROGRAM_NAME \"{}\")", origin.program)?;
     writeln!(out, "(VERSION \"{}\")", origin.version)?;

@@ -39,6 +39,13 @@ pub(super) struct Variable {
     pub is_changed: bool,
 }
 
+/// A bit of a bus: which bus, and where among `Variables::nets`.
+#[derive(Clone, Copy)]
+pub(super) struct BusBit {
+    pub variable: u32,
+    pub place: u32,
+}
+
 /// The distinct variables of a file.
 pub(super) struct Variables {
     pub all: Vec<Variable>,
@@ -123,8 +130,8 @@ impl Variables {
         (variable, false)
     }
 
-    /// Lists for every net the buses that it is a bit of: start of each net's list, then the lists.
-    pub(super) fn buses_of_nets(&self) -> (Vec<u32>, Vec<u32>) {
+    /// Lists for every net the bits of buses that it is: start of each net's list, then the lists.
+    pub(super) fn bus_bits(&self) -> (Vec<u32>, Vec<BusBit>) {
         let buses = || (0u32..).zip(&self.all).filter(|(_, v)| v.nets.len() > 1);
         let mut start = vec![0u32; self.scalar_of_net.len() + 1];
         for (_, bus) in buses() {
@@ -136,15 +143,20 @@ impl Variables {
             start[i] += start[i - 1];
         }
         let mut next = start.clone();
-        let mut lists = vec![0; start[start.len() - 1] as usize];
+        let empty = BusBit {
+            variable: NO_VARIABLE,
+            place: 0,
+        };
+        let mut bits = vec![empty; start[start.len() - 1] as usize];
         for (variable, bus) in buses() {
-            for &net in &self.nets[bus.nets.clone()] {
-                let at = &mut next[net as usize];
-                lists[*at as usize] = variable;
-                *at += 1;
+            for place in bus.nets.clone() {
+                let slot = &mut next[self.nets[place] as usize];
+                let place = place as u32;
+                bits[*slot as usize] = BusBit { variable, place };
+                *slot += 1;
             }
         }
-        (start, lists)
+        (start, bits)
     }
 }
 

@@ -21,7 +21,7 @@
 use std::io;
 use std::ops::RangeInclusive;
 
-use super::variables::{NO_VARIABLE, Variable, Variables};
+use super::variables::{BusBit, NO_VARIABLE, Variable, Variables};
 use crate::kernel::Observer;
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
@@ -48,7 +48,7 @@ pub trait Format {
     fn scalar(&mut self, variable: u32, value: u8);
 
     /// A variable of several nets has these values, most significant first.
-    fn bus(&mut self, variable: u32, values: impl ExactSizeIterator<Item = u8>);
+    fn bus(&mut self, variable: u32, values: &[u8]);
 
     /// All changes of an instant have been reported.
     fn end_instant(&mut self);
@@ -86,21 +86,23 @@ pub struct WaveWriter<F: Format> {
     changed: Vec<u32>,
     variables: Vec<Variable>,
     variable_nets: Vec<u32>,
+    /// What the file shows of each of `variable_nets`, as a character. Of buses alone; scalars need it once.
+    variable_values: Vec<u8>,
     changed_buses: Vec<u32>,
-    /// Buses of net `n`: `net_buses[net_buses_start[n]..net_buses_start[n + 1]]`.
-    net_buses: Vec<u32>,
-    net_buses_start: Vec<u32>,
+    /// Bits of buses that net `n` is: `bus_bits[bus_bits_start[n]..bus_bits_start[n + 1]]`.
+    bus_bits: Vec<BusBit>,
+    bus_bits_start: Vec<u32>,
 }
 
 impl<F: Format> WaveWriter<F> {
     /// A writer of these variables of `netlist`, which `format` has declared.
     pub(super) fn of(format: F, netlist: &Netlist, variables: Variables) -> Self {
-        let (net_buses_start, net_buses) = variables.buses_of_nets();
+        let (bus_bits_start, bus_bits) = variables.bus_bits();
         let unknown = CHARACTERS[Logic::X as usize];
         let nets: Vec<NetState> = variables
             .scalar_of_net
             .iter()
-            .zip(net_buses_start.windows(2))
+            .zip(bus_bits_start.windows(2))
             .map(|(&scalar, buses)| NetState {
                 scalar,
                 now: unknown,
@@ -118,10 +120,11 @@ impl<F: Format> WaveWriter<F> {
             nets,
             changed: Vec::new(),
             variables: variables.all,
+            variable_values: vec![unknown; variables.nets.len()],
             variable_nets: variables.nets,
             changed_buses: Vec::new(),
-            net_buses,
-            net_buses_start,
+            bus_bits,
+            bus_bits_start,
         }
     }
 
@@ -167,13 +170,13 @@ impl<F: Format> WaveWriter<F> {
         }
         self.changed.clear();
         self.format.begin(time);
+        for (value, &net) in self.variable_values.iter_mut().zip(&self.variable_nets) {
+            *value = self.nets[net as usize].now;
+        }
         for (index, variable) in (0..).zip(&self.variables) {
-            match &self.variable_nets[variable.nets.clone()] {
-                [net] => self.format.scalar(index, self.nets[*net as usize].now),
-                nets => {
-                    let values = nets.iter().map(|&net| self.nets[net as usize].now);
-                    self.format.bus(index, values);
-                }
+            match &self.variable_values[variable.nets.clone()] {
+                [value] => self.format.scalar(index, *value),
+                values => self.format.bus(index, values),
             }
         }
         self.format.begun();
@@ -196,12 +199,13 @@ impl<F: Format> WaveWriter<F> {
             if scalar != NO_VARIABLE {
                 self.format.scalar(scalar, now);
             }
-            let buses = &self.net_buses_start[net as usize..][..2];
-            for &index in &self.net_buses[buses[0] as usize..buses[1] as usize] {
-                let bus = &mut self.variables[index as usize];
+            let bits = &self.bus_bits_start[net as usize..][..2];
+            for bit in &self.bus_bits[bits[0] as usize..bits[1] as usize] {
+                self.variable_values[bit.place as usize] = now;
+                let bus = &mut self.variables[bit.variable as usize];
                 if !bus.is_changed {
                     bus.is_changed = true;
-                    self.changed_buses.push(index);
+                    self.changed_buses.push(bit.variable);
                 }
             }
         }
@@ -209,8 +213,7 @@ impl<F: Format> WaveWriter<F> {
         for &index in &self.changed_buses {
             let bus = &mut self.variables[index as usize];
             bus.is_changed = false;
-            let nets = &self.variable_nets[bus.nets.clone()];
-            let values = nets.iter().map(|&net| self.nets[net as usize].now);
+            let values = &self.variable_values[bus.nets.clone()];
             self.format.bus(index, values);
         }
         self.changed_buses.clear();

@@ -3,7 +3,7 @@
 
 use std::io::Cursor;
 
-use femtogate::kernel::{Activity, Kernel, in_order};
+use femtogate::kernel::{Activity, Kernel, Stimulus};
 use femtogate::netlist::Netlist;
 use femtogate::units::Time;
 use femtogate::waves::{Selection, VcdWriter};
@@ -22,7 +22,13 @@ fn random_circuit(case: &Case) -> Result<(), TestCaseError> {
     let mut activity = Activity::new(&netlist, Time::ZERO);
     let timing = case.timing(&netlist);
     let mut kernel = Kernel::new(&netlist, &timing);
-    kernel.run(&mut in_order(drives), end, &mut (&mut dump, &mut activity));
+    kernel
+        .run(
+            &mut Stimulus::sorted(drives),
+            end,
+            &mut (&mut dump, &mut activity),
+        )
+        .unwrap();
     let dump = Cursor::new(dump.finish(end).unwrap());
     let waves = Waves::read(dump, &netlist.scopes()[0].name);
     let text = saif(&netlist, &activity, end);

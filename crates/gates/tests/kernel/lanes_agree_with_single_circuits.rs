@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use femtogate::kernel::{Drive, Kernel, LANES, LaneDrive, LaneKernel, Lanes, in_order};
+use femtogate::kernel::{Drive, Kernel, LANES, LaneDrive, LaneKernel, Lanes, Stimulus};
 use femtogate::logic::Logic;
 use femtogate::netlist::{NetId, Netlist};
 use femtogate::units::Time;
@@ -42,7 +42,9 @@ fn compare_circuit(case: &Case, seed: u64) -> Result<(), TestCaseError> {
         values: Lanes::all(drive.value),
     });
     let mut lanes = LaneKernel::new(&netlist, &timing);
-    lanes.run(&mut together.peekable(), end, &mut traces);
+    lanes
+        .run(&mut together.peekable(), end, &mut traces)
+        .unwrap();
     let bus: Vec<NetId> = (0..netlist.net_count().min(8)).map(NetId::new).collect();
     let of_lanes: usize = traces.0.iter().map(Vec::len).sum();
     prop_assert_eq!(lanes.lane_changes(), of_lanes as u64);
@@ -51,9 +53,9 @@ fn compare_circuit(case: &Case, seed: u64) -> Result<(), TestCaseError> {
     for (lane, mut found) in traces.0.into_iter().enumerate() {
         let mine = drives.iter().filter(|(mask, _)| mask >> lane & 1 == 1);
         let mut trace = Trace::default();
-        let mut stimulus = in_order(mine.map(|(_, drive)| *drive).collect());
+        let mut stimulus = Stimulus::sorted(mine.map(|(_, drive)| *drive));
         let mut kernel = Kernel::new(&netlist, &timing);
-        kernel.run(&mut stimulus, end, &mut trace);
+        kernel.run(&mut stimulus, end, &mut trace).unwrap();
         prop_assert_eq!(lanes.number(&bus[..1], lane), kernel.number(&bus[..1]));
         prop_assert_eq!(lanes.number(&bus, lane), kernel.number(&bus));
         trace.0.sort_by_key(|(time, net, _)| (*time, *net));

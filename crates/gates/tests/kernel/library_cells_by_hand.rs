@@ -1,9 +1,9 @@
 //! Cells of `vectors/liberty/example.lib`, whose tables are straight lines (`make.py` beside it): delays, limits, energies, area and
 //! leakage by hand.
 
-use femtogate::kernel::{Drive, Kernel, Recorder, in_order};
+use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
+use femtogate::liberty::{Characterised, Environment, Liberty};
 use femtogate::logic::Logic;
-use femtogate::netlist::liberty::{Characterised, Environment, Liberty};
 use femtogate::netlist::{CellKind, CheckKind, Control, Edge, ModuleBuilder, Netlist};
 use femtogate::units::Time;
 
@@ -35,8 +35,8 @@ fn alone(library: &Liberty, kind: CellKind) -> (Netlist, Characterised, f64) {
     let z = m.output("Z");
     m.gate_into(kind, &inputs, z);
     let netlist = Netlist::elaborate(&m.finish().unwrap());
-    let environment = Environment::of(library);
-    let made = Characterised::of(&netlist, library, &environment);
+    let environment = Environment::new(library);
+    let made = Characterised::new(&netlist, library, &environment);
     (netlist, made, environment.input_slew_fs * 1e-6)
 }
 
@@ -62,13 +62,21 @@ fn delays_of_a_gate_of_two_cells() {
     let drives = drives.map(|(ns, net, value)| Drive::new(Time::from_ns(ns), net, value));
     let mut seen = Recorder::new([a, b, z]);
     let mut kernel = Kernel::new(&netlist, &made.timing);
-    kernel.run(&mut in_order(drives.to_vec()), Time::from_ns(3), &mut seen);
+    kernel
+        .run(
+            &mut Stimulus::sorted(drives.to_vec()),
+            Time::from_ns(3),
+            &mut seen,
+        )
+        .unwrap();
     assert_eq!(kernel.number(&[a, b, z]), Some(0b111));
-    kernel.run(
-        &mut in_order(drives[3..].to_vec()),
-        Time::from_ns(6),
-        &mut seen,
-    );
+    kernel
+        .run(
+            &mut Stimulus::sorted(drives[3..].to_vec()),
+            Time::from_ns(6),
+            &mut seen,
+        )
+        .unwrap();
     assert_eq!(kernel.number(&[a, b, z]), Some(0b010));
     // The NAND's edge is the inverse one, and its slew what the inverter sees.
     let by_hand = |nand: f64, inverter: f64| {
@@ -104,9 +112,9 @@ fn limits_of_a_flip_flop() {
     let unused = m.wire("QN");
     m.cell("flip_flop", CellKind::Dffr, &[d, ck, r], &[q, unused]);
     let netlist = Netlist::elaborate(&m.finish().unwrap());
-    let environment = Environment::of(&library);
+    let environment = Environment::new(&library);
     let slew = environment.input_slew_fs * 1e-6;
-    let made = Characterised::of(&netlist, &library, &environment);
+    let made = Characterised::new(&netlist, &library, &environment);
     let limits = made.timing.limits(0, CellKind::Dffr);
     let limit = |kind, edge| limits.at(Control::Reset, kind, edge);
     for (kind, [rise_fs, fall_fs]) in [
@@ -148,8 +156,8 @@ fn energies_of_two_inverters() {
         let z = m.output("Z");
         m.gate_into(CellKind::Inv, &[between], z);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
-        let environment = Environment::of(library);
-        let made = Characterised::of(&netlist, library, &environment);
+        let environment = Environment::new(library);
+        let made = Characterised::new(&netlist, library, &environment);
         let [within, loads] = made.energy_j((&netlist, 0), library, 2.0, |_| 10.0);
         (within, loads, environment.input_slew_fs * 1e-6)
     };

@@ -3,7 +3,7 @@
 
 use crate::tool;
 
-use femtogate::netlist::liberty::{
+use femtogate::liberty::{
     Characterised, Clocking, Environment, Liberty, write_constraints, write_mapped,
     write_mapped_cells, write_mapped_sdf,
 };
@@ -33,8 +33,8 @@ fn small() -> Netlist {
 /// mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc of a library.
 fn files(text: &str) -> [String; 4] {
     let library = Liberty::read(text, &[]).unwrap_or_else(|e| panic!("{}: {e}", e.line));
-    let (netlist, environment) = (small(), Environment::of(&library));
-    let made = Characterised::of(&netlist, &library, &environment);
+    let (netlist, environment) = (small(), Environment::new(&library));
+    let made = Characterised::new(&netlist, &library, &environment);
     let mut files: [Vec<u8>; 4] = Default::default();
     let [verilog, models, sdf, sdc] = &mut files;
     write_mapped(verilog, &netlist, &library, &made).unwrap();
@@ -145,7 +145,7 @@ fn capacitance_of_outputs_is_a_load() {
             slowest_slew_fs: 1e9,
             wire_ff: 0.0,
         };
-        let made = Characterised::of(&netlist, &library, &environment);
+        let made = Characterised::new(&netlist, &library, &environment);
         let arc = made.timing.of(0)[0][0];
         [arc.rise_fs, arc.fall_fs].map(f64::from)
     };
@@ -164,8 +164,8 @@ fn capacitance_of_outputs_is_a_load() {
 fn the_extremes_of_delays_are_those_of_the_tables() {
     let extremes = |text: &str| {
         let library = Liberty::read(text, &[]).unwrap();
-        let (netlist, environment) = (small(), Environment::of(&library));
-        let made = Characterised::of(&netlist, &library, &environment);
+        let (netlist, environment) = (small(), Environment::new(&library));
+        let made = Characterised::new(&netlist, &library, &environment);
         made.extreme_delays(&netlist, &library)
     };
     let [(shortest, _), (longest, of_longest)] = extremes(&text());

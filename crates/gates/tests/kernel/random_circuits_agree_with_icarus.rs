@@ -26,12 +26,11 @@ use std::fmt::Write as _;
 use std::io::Cursor;
 use std::time::Instant;
 
-use femtogate::kernel::{Drive, Kernel, merge};
-use femtogate::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
-use femtogate::netlist::{
-    Corner, Netlist, Timing, write_cells, write_delays, write_modules, write_parametric_cells,
-};
+use femtogate::kernel::{Drive, Kernel, Stimulus};
+use femtogate::netlist::{Corner, Netlist, Timing};
+use femtogate::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use femtogate::units::Time;
+use femtogate::verilog::{write_cells, write_delays, write_modules, write_parametric_cells};
 use femtogate::waves::{Selection, VcdWriter};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, FileFailurePersistence, TestCaseError, TestError, TestRunner};
@@ -60,8 +59,8 @@ fn simulate(
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
     let mut kernel = Kernel::new(netlist, timing);
-    let mut stimulus = merge([Box::new(drives.into_iter()) as Box<_>]);
-    kernel.run(&mut stimulus, end, &mut writer);
+    let mut stimulus = Stimulus::new(drives);
+    kernel.run(&mut stimulus, end, &mut writer).unwrap();
     let top = &netlist.scopes()[0].name;
     Waves::read(Cursor::new(writer.finish(end).unwrap()), top)
 }

@@ -165,7 +165,7 @@ fn latched(state: Logic, [data, clock, reset, set]: [Logic; 4], clock_before: Lo
 fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64> {
     let mut pulses = vec![0; of_net.len()];
     for (index, cell) in netlist.cells().iter().enumerate() {
-        let pins = &cell.inputs[..cell.kind.inputs().len()];
+        let pins: Vec<NetId> = cell.input_nets().collect();
         let at = |net: NetId, time: i64| {
             let changes = &of_net[net.index()];
             let until = changes.partition_point(|change| change.0 <= time);
@@ -175,7 +175,8 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
             .iter()
             .flat_map(|net| of_net[net.index()].iter().map(|change| change.0))
             .collect();
-        for (which, &output) in cell.outputs.iter().enumerate().filter(|(_, o)| o.is_some()) {
+        for (which, output) in cell.outputs.into_iter().enumerate() {
+            let Some(output) = output else { continue };
             let mut last = Logic::X;
             let mut on_their_way: Vec<(i64, Logic)> = Vec::new();
             for &time in &times {
@@ -260,6 +261,14 @@ pub fn compare(
 /// What it says of a run.
 pub fn saif(netlist: &Netlist, activity: &Activity, end: Time) -> String {
     let mut text = Vec::new();
-    write_saif(&mut text, netlist, &activity.until(end), end, true).unwrap();
+    write_saif(
+        &mut text,
+        netlist,
+        &activity.until(end),
+        end,
+        true,
+        femtogate::Origin::default(),
+    )
+    .unwrap();
     String::from_utf8(text).unwrap()
 }

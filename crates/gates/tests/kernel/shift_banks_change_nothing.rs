@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use femtogate::kernel::{Drive, Kernel, in_order};
+use femtogate::kernel::{Drive, Kernel, Stimulus};
 use femtogate::logic::Logic;
-use femtogate::netlist::{CellKind, Corner, Library, Module, ModuleBuilder, Net, Netlist, Timing};
+use femtogate::netlist::{CellKind, Corner, Library, Module, ModuleBuilder, Netlist, Timing};
 use femtogate::units::Time;
 use proptest::prelude::*;
 
@@ -24,11 +24,11 @@ fn register(stages: usize, watched: impl IntoIterator<Item = usize>) -> Arc<Modu
             &name,
             CellKind::Dffr,
             &[data, ck, r],
-            &[q[stage], Net::NONE],
+            &[Some(q[stage]), None],
         );
         let name = format!("copy_{stage}");
         let pins = [q[stage], other, r];
-        m.cell(&name, CellKind::Dffr, &pins, &[copies[stage], Net::NONE]);
+        m.cell(&name, CellKind::Dffr, &pins, &[Some(copies[stage]), None]);
     }
     for stage in watched {
         m.gate(CellKind::Inv, &[q[stage]]);
@@ -40,7 +40,9 @@ fn register(stages: usize, watched: impl IntoIterator<Item = usize>) -> Arc<Modu
 fn changes(netlist: &Netlist, timing: &Timing, drives: Vec<Drive>) -> Vec<Change> {
     let mut trace = Trace::default();
     let end = drives.last().expect("drives").time + Time::from_ns(2);
-    Kernel::new(netlist, timing).run(&mut in_order(drives), end, &mut trace);
+    Kernel::new(netlist, timing)
+        .run(&mut Stimulus::sorted(drives), end, &mut trace)
+        .unwrap();
     trace.0.sort_by_key(|&(time, net, _)| (time, net));
     trace.0
 }
@@ -57,7 +59,7 @@ proptest! {
         steps in prop::collection::vec((0u16..400, 0u8..100, 5_000i64..200_000), 20..600),
     ) {
         let netlist = Netlist::elaborate(&register(stages, watched));
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let nets = ["D", "CK", "R", "OTHER"].map(|name| netlist.net(name).unwrap());
         let mut drives: Vec<Drive> = nets.map(|n| Drive::new(Time::ZERO, n, false)).into();
         drives.push(Drive::new(Time::from_ps(1), nets[2], true));
@@ -88,7 +90,7 @@ proptest! {
         prop_assert_eq!(trace(&netlist, &timing, drives.clone(), None), apart);
         // Where a gate watches every output there is no bank at all, and the register's nets, which come first, do the same.
         let watched = Netlist::elaborate(&register(stages, 0..stages));
-        let timing_of_watched = Timing::nominal(&watched, &Library::default(), Corner::Typ);
+        let timing_of_watched = Timing::nominal(&watched, &Library::generic_40nm(), Corner::Typ);
         let here = changes(&netlist, &timing, drives.clone());
         let mut there = changes(&watched, &timing_of_watched, drives);
         let of_register = 4 + 2 * stages;

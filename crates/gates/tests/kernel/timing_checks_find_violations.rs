@@ -1,14 +1,12 @@
 //! Timing checks find every violation with its exact slack and nothing else: hand-made ones at the limit's very
 //! femtosecond, random ones are in `violations_are_those_of_the_definitions`.
 
-use femtogate::kernel::{
-    CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, in_order, merge,
-};
+use femtogate::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks};
 use femtogate::logic::Logic;
-use femtogate::netlist::sdf::{Sdf, annotate};
 use femtogate::netlist::{
     CellKind, CheckKind, Corner, Edge, Library, ModuleBuilder, NetId, Netlist, Timing,
 };
+use femtogate::sdf::{Sdf, annotate};
 use femtogate::units::Time;
 
 /// The clock edge, or whatever a test measures from.
@@ -22,11 +20,10 @@ pub fn pair(kind: CellKind) -> Netlist {
     let mut m = ModuleBuilder::new("pair");
     let pins: Vec<_> = kind.inputs().iter().map(|pin| m.input(pin)).collect();
     let (q1, q2) = (m.output("Q1"), m.output("Q2"));
-    let unused = femtogate::netlist::Net::NONE;
-    m.cell("first", kind, &pins, &[q1, unused]);
+    m.cell("first", kind, &pins, &[Some(q1), None]);
     let mut second = pins;
     second[0] = q1;
-    m.cell("second", kind, &second, &[q2, unused]);
+    m.cell("second", kind, &second, &[Some(q2), None]);
     Netlist::elaborate(&m.finish().unwrap())
 }
 
@@ -46,9 +43,14 @@ pub fn simulate(
         let net = netlist.net(pin).unwrap();
         Drive::new(Time::from_fs(fs), net, value)
     });
-    let stream: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives);
     let end = Time::from_fs(4 * EDGE);
-    kernel.run(&mut merge([stream]), end, &mut (&mut trace, &mut checks));
+    kernel
+        .run(
+            &mut Stimulus::new(drives),
+            end,
+            &mut (&mut trace, &mut checks),
+        )
+        .unwrap();
     (checks.report(netlist), trace, kernel)
 }
 
@@ -131,7 +133,7 @@ fn every_check_is_exact_to_the_femtosecond() {
 
 /// One kind of check at its limit and a femtosecond beside it.
 fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str, Edge)) {
-    let (library, netlist) = (Library::default(), pair(kind));
+    let (library, netlist) = (Library::generic_40nm(), pair(kind));
     let limit = i64::from(library.checks(kind).toward(check, varied.1, corner));
     for slack in [1 - limit, -5_000, -1, 0, 1, 5_000] {
         let steps = script(kind, check, varied, limit + slack);
@@ -161,7 +163,7 @@ fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str
 #[test]
 fn each_control_is_judged_by_its_own_limit() {
     let (kind, corner) = (CellKind::Dffsr, Corner::Typ);
-    let (library, netlist) = (Library::default(), pair(kind));
+    let (library, netlist) = (Library::generic_40nm(), pair(kind));
     let mut timing = Timing::nominal(&netlist, &library, corner);
     let text = "(DELAYFILE (SDFVERSION \"3.0\") (TIMESCALE 1fs)
         (CELL (CELLTYPE \"DFFSR\") (INSTANCE first) (TIMINGCHECK
@@ -174,8 +176,10 @@ fn each_control_is_judged_by_its_own_limit() {
         let drives = steps.into_iter().map(|(fs, pin, value)| {
             Drive::new(Time::from_fs(fs), netlist.net(pin).unwrap(), value)
         });
-        let mut drives = in_order(drives.collect());
-        Kernel::new(&netlist, &timing).run(&mut drives, Time::from_fs(2 * EDGE), &mut checks);
+        let mut drives = Stimulus::sorted(drives);
+        Kernel::new(&netlist, &timing)
+            .run(&mut drives, Time::from_fs(2 * EDGE), &mut checks)
+            .unwrap();
         let report = checks.report(&netlist);
         let first = report.violations.iter().filter(|v| v.cell == "pair.first");
         let slacks: Vec<_> = first.map(|v| v.slack_fs).collect();
@@ -187,7 +191,7 @@ fn each_control_is_judged_by_its_own_limit() {
 
 #[test]
 fn a_pulse_on_d_is_judged_at_both_its_edges() {
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let limits = library.checks(CellKind::Dffr);
     let [rise, fall] =
         Edge::BOTH.map(|e| i64::from(limits.toward(CheckKind::Setup, e, Corner::Typ)));
@@ -203,7 +207,7 @@ fn a_pulse_on_d_is_judged_at_both_its_edges() {
 }
 
 fn kinds(steps: &[(i64, &'static str, Logic)]) -> Vec<(CheckKind, i64)> {
-    let (library, kind) = (Library::default(), CellKind::Dffr);
+    let (library, kind) = (Library::generic_40nm(), CellKind::Dffr);
     let steps = after_reset(kind, steps);
     let policy = Policy::ReportOnly;
     let (report, ..) = simulate(&pair(kind), &library, Corner::Typ, policy, &steps);
@@ -213,7 +217,7 @@ fn kinds(steps: &[(i64, &'static str, Logic)]) -> Vec<(CheckKind, i64)> {
 
 /// The limit for a rising D.
 fn limit(check: CheckKind) -> i64 {
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let limits = library.checks(CellKind::Dffr);
     limits.toward(check, Edge::Rise, Corner::Typ).into()
 }
@@ -267,7 +271,7 @@ fn a_held_flip_flop_is_not_judged() {
 
 #[test]
 fn nothing_is_judged_before_its_time_but_earlier_events_are_remembered() {
-    let (library, netlist) = (Library::default(), pair(CellKind::Dffr));
+    let (library, netlist) = (Library::generic_40nm(), pair(CellKind::Dffr));
     let run = |not_before: i64| {
         let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ)
             .not_before(Time::from_fs(not_before));
@@ -278,9 +282,14 @@ fn nothing_is_judged_before_its_time_but_earlier_events_are_remembered() {
         let drives = drives.into_iter().map(|(fs, pin, value)| {
             Drive::new(Time::from_fs(fs), netlist.net(pin).unwrap(), value)
         });
-        let stream: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives);
         let mut kernel = Kernel::new(&netlist, &timing);
-        kernel.run(&mut merge([stream]), Time::from_fs(2 * EDGE), &mut checks);
+        kernel
+            .run(
+                &mut Stimulus::new(drives),
+                Time::from_fs(2 * EDGE),
+                &mut checks,
+            )
+            .unwrap();
         checks.report(&netlist).violated()
     };
     assert_eq!(run(EDGE), 1);
@@ -289,7 +298,7 @@ fn nothing_is_judged_before_its_time_but_earlier_events_are_remembered() {
 
 #[test]
 fn a_violation_makes_the_state_unknown_downstream_until_a_reset() {
-    let (library, kind) = (Library::default(), CellKind::Dffr);
+    let (library, kind) = (Library::generic_40nm(), CellKind::Dffr);
     let netlist = pair(kind);
     let steps = after_reset(
         kind,
@@ -334,7 +343,7 @@ fn a_violation_makes_the_state_unknown_downstream_until_a_reset() {
 #[test]
 fn a_report_round_trips_through_json() {
     let steps = script(CellKind::Dffr, CheckKind::Hold, ("R", Edge::Rise), 4);
-    let library = Library::default();
+    let library = Library::generic_40nm();
     let policy = Policy::ReportOnly;
     let (report, ..) = simulate(
         &pair(CellKind::Dffr),

@@ -1,6 +1,6 @@
 //! Every change of a circuit, of many in lanes, and its hash.
 
-use femtogate::kernel::{Drive, Kernel, LaneObserver, Lanes, Observer, TraceHash, in_order};
+use femtogate::kernel::{Drive, Kernel, LaneObserver, Lanes, Observer, Stimulus, TraceHash};
 use femtogate::logic::Logic;
 use femtogate::netlist::{NetId, Netlist, Timing};
 use femtogate::units::Time;
@@ -44,7 +44,9 @@ pub fn trace(
     }
     let end = drives.last().map_or(Time::ZERO, |d| d.time) + Time::from_ns(2);
     let mut hash = TraceHash::new(netlist);
-    kernel.run(&mut in_order(drives), end, &mut hash);
+    kernel
+        .run(&mut Stimulus::sorted(drives), end, &mut hash)
+        .unwrap();
     assert_eq!(hash.changes(), kernel.statistics().changes);
     (hash.changes(), hash.hash())
 }

@@ -7,7 +7,7 @@ use crate::timing_checks_find_violations::{Script, pair, simulate};
 
 use std::cell::Cell;
 
-use femtogate::kernel::{CheckReport, Kernel, Policy, Recorder, TimingChecks, in_order};
+use femtogate::kernel::{CheckReport, Kernel, Policy, Recorder, Stimulus, TimingChecks};
 use femtogate::logic::Logic;
 use femtogate::netlist::{
     CellKind, CheckKind, CheckLimits, Corner, DataLimit, Delay, Edge, Library, NetId, Netlist,
@@ -37,12 +37,12 @@ fn events(trace: &Recorder, net: NetId) -> Vec<(i64, Logic, Logic)> {
 fn reference(
     trace: &Recorder,
     kind: CellKind,
-    inputs: &[NetId],
+    inputs: &[Option<NetId>],
     limits: &CheckLimits,
 ) -> Vec<(CheckKind, String, i64, i64)> {
     let pin = |name: &str| {
         let index = kind.inputs().iter().position(|pin| *pin == name).unwrap();
-        events(trace, inputs[index])
+        events(trace, inputs[index].unwrap())
     };
     let rises = |list: &[(i64, Logic, Logic)]| -> Vec<i64> {
         let up = list
@@ -189,7 +189,13 @@ fn judge_netlist(
     let mut kernel = Kernel::new(&netlist, &case.timing(&netlist));
     let drives = case.drives(&netlist);
     let end = drives.last().map_or(Time::ZERO, |d| d.time) + Time::from_ns(2);
-    kernel.run(&mut in_order(drives), end, &mut (&mut trace, &mut checks));
+    kernel
+        .run(
+            &mut Stimulus::sorted(drives),
+            end,
+            &mut (&mut trace, &mut checks),
+        )
+        .unwrap();
     let report = checks.report(&netlist);
     judged(&netlist, &report, &trace, limits)?;
     Ok(CheckKind::ALL.map(|kind| {
@@ -253,7 +259,7 @@ proptest! {
     ) {
         let kind = if has_set { CellKind::Dffsr } else { CellKind::Dffr };
         let policy = if spreads_x { Policy::XOnViolation } else { Policy::ReportOnly };
-        let mut library = Library::default();
+        let mut library = Library::generic_40nm();
         let limits = self::limits(limits);
         library.set_checks(kind, limits);
         let arc = |fs| [TimingArc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) }; 2];

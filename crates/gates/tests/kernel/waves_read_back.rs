@@ -128,7 +128,7 @@ fn drives(netlist: &Netlist, choices: &[(usize, u8, i64)]) -> Vec<Drive> {
 
 /// Delays of 0 and 1 ps, so that many changes fall into one instant and some are undone in it.
 fn coarse_library() -> Library {
-    let mut library = Library::default();
+    let mut library = Library::generic_40nm();
     for kind in CellKind::ALL {
         let fs = if kind.is_flip_flop() { 1_000 } else { 0 };
         let arc = TimingArc {
@@ -156,8 +156,7 @@ fn simulate(
     kept: Option<(i64, i64)>,
 ) -> Simulated {
     let end = drives.last().unwrap().time + Time::from_ns(3);
-    let drives: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives.into_iter());
-    let mut stimulus: Stimulus = drives.peekable();
+    let mut stimulus = Stimulus::new(drives);
     let selection = Selection::all().with_anonymous();
     let mut vcd = VcdWriter::new(Vec::new(), netlist, &selection).unwrap();
     let mut fst = FstWriter::new(Cursor::new(Vec::new()), netlist, &selection).unwrap();
@@ -171,7 +170,7 @@ fn simulate(
     let recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
     let mut observers = (recorder, (vcd, fst));
     let mut kernel = Kernel::new(netlist, &Timing::nominal(netlist, library, Corner::Typ));
-    kernel.run(&mut stimulus, end, &mut observers);
+    kernel.run(&mut stimulus, end, &mut observers).unwrap();
     let (recorder, (vcd, fst)) = observers;
     let vcd = String::from_utf8(vcd.finish(end).unwrap()).unwrap();
     let fst = fst.finish(end).unwrap().into_inner();
@@ -401,7 +400,7 @@ proptest! {
         kept in prop::option::of((0i64..=1000, 0i64..=1000)),
     ) {
         let netlist = chip(stages, &gates);
-        let library = if is_coarse { coarse_library() } else { Library::default() };
+        let library = if is_coarse { coarse_library() } else { Library::generic_40nm() };
         let simulated = simulate(&netlist, &library, drives(&netlist, &choices), kept);
         check_with_wellen(simulated.vcd.as_bytes(), &netlist, &simulated);
         check_with_vcd(&netlist, &simulated);
@@ -419,7 +418,7 @@ fn a_long_file_reads_back() {
         .map(|i| (i, (i / inputs % 2) as u8, 300_000 + i as i64 % 7))
         .collect();
     let drives = drives(&netlist, &choices);
-    let simulated = simulate(&netlist, &Library::default(), drives, Some((100, 900)));
+    let simulated = simulate(&netlist, &Library::generic_40nm(), drives, Some((100, 900)));
     assert!(simulated.fst.len() < simulated.vcd.len() / 4);
     check_with_wellen(&simulated.fst, &netlist, &simulated);
     check_with_fst2vcd(&simulated);
@@ -431,7 +430,7 @@ fn the_same_simulation_writes_the_same_bytes() {
     let run = || {
         let netlist = chip(4, &[(0, 5, 9), (1, 3, 12)]);
         let drives = drives(&netlist, &choices);
-        let simulated = simulate(&netlist, &Library::default(), drives, None);
+        let simulated = simulate(&netlist, &Library::generic_40nm(), drives, None);
         (simulated.vcd, simulated.fst)
     };
     assert_eq!(run(), run());

@@ -49,14 +49,15 @@ impl LoadTiming {
         // The inverse of ROW_DONE clocks the tokens and gates WRITE.
         let done = LoadProbe::RowDone.net(&netlist);
         let inverters = netlist.cells().iter().filter(|c| c.kind == CellKind::Inv);
-        let mut inverters = inverters.filter(|c| c.inputs[0] == done);
+        let mut inverters = inverters.filter(|c| c.input(0) == done);
         let step = inverters.next().expect("ROW_DONE's inverter").outputs[0];
+        let step = step.expect("an inverter that is read");
         let select = LoadProbe::Select.bus(&netlist);
         let write = LoadProbe::Write.net(&netlist);
         let loads = LoadProbe::MemoryLoad.bus(&netlist);
         let tokens = requirements(&loads);
         let gated = requirements(&[step]);
-        let is_memory = |r: &&Requirement| loads.contains(&netlist.cells()[r.cell].inputs[1]);
+        let is_memory = |r: &&Requirement| loads.contains(&netlist.cells()[r.cell].input(1));
         let memories = gated.all().iter().filter(is_memory);
         let others = tokens.all().iter().filter(|r| !is_memory(r));
         let latest = |nets: &[NetId]| {
@@ -114,8 +115,12 @@ pub fn load_works(
         let mut kernel = Kernel::new(&netlist, &timing);
         let settled = end + Time::from_ns(5);
         match limits {
-            Limits::Kept => kernel.run(&mut stimulus, settled, &mut checks),
-            Limits::Ignored => kernel.run(&mut stimulus, settled, &mut ()),
+            Limits::Kept => kernel
+                .run(&mut stimulus, settled, &mut checks)
+                .expect("no loop of cells without delay"),
+            Limits::Ignored => kernel
+                .run(&mut stimulus, settled, &mut ())
+                .expect("no loop of cells without delay"),
         }
         let mut memories = memories.iter().zip(&starts);
         let is_right = memories.all(|(nets, &start)| kernel.number(nets) == Some(start.into()));

@@ -72,20 +72,17 @@ impl Capacitances {
     /// Energy of what a cell's pins and inner nodes did, J.
     fn cell_j(&self, netlist: &Netlist, cell: usize, nets: &[NetActivity]) -> f64 {
         let cell = &netlist.cells()[cell];
-        let toggles = |net: NetId| match net.is_some() {
-            true => nets[net.index()].toggles as f64,
-            false => 0.0,
-        };
-        let pins = cell.inputs[..cell.kind.inputs().len()].iter().enumerate();
-        let of_pin = |(pin, &net): (usize, &_)| {
+        let toggles = |net: NetId| nets[net.index()].toggles as f64;
+        let pins = cell.input_nets().enumerate();
+        let of_pin = |(pin, net): (usize, _)| {
             toggles(net) * (f64::from(pin_pairs(cell.kind, pin)) * self.pair_f + self.wire_f)
         };
         let inputs: f64 = pins.map(of_pin).sum();
         // A flip-flop's outputs change together, and its latches with them.
-        let outputs = cell.outputs.iter().map(|&net| toggles(net));
-        let changes = outputs.clone().fold(0.0, f64::max);
+        let outputs = cell.outputs.map(|net| net.map_or(0.0, toggles));
+        let changes = outputs.iter().copied().fold(0.0, f64::max);
         let inner = f64::from(inner_pairs(cell.kind)) * self.pair_f * changes;
-        let drains = self.drain_f * outputs.sum::<f64>();
+        let drains = self.drain_f * outputs.iter().sum::<f64>();
         0.5 * self.supply_v * self.supply_v * (inputs + inner + drains)
     }
 
@@ -164,11 +161,8 @@ impl MacropixelPower {
         let blocks = capacitances.blocks_j(&netlist, scope, &nets).into_iter();
         let scopes = scope..scope + netlist.scopes()[scope].subtree;
         let outputs = scopes.flat_map(|scope| netlist.cells_of(scope));
-        let outputs = outputs.flat_map(|cell| netlist.cells()[cell].outputs);
-        let toggles: u64 = outputs
-            .filter(|net| net.is_some())
-            .map(|net| nets[net.index()].toggles)
-            .sum();
+        let outputs = outputs.flat_map(|cell| netlist.cells()[cell].output_nets());
+        let toggles: u64 = outputs.map(|net| nets[net.index()].toggles).sum();
         let library = CellLibrary::of(config)
             .ok()
             .and_then(CellLibrary::from_file);
@@ -221,8 +215,8 @@ impl MacropixelPower {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::{Drive, Kernel, in_order};
-    use crate::netlist::{Corner, Library, ModuleBuilder, Net, Timing};
+    use crate::kernel::{Drive, Kernel, Stimulus};
+    use crate::netlist::{Corner, Library, ModuleBuilder, Timing};
     use crate::units::Time;
 
     /// By hand: two inverters in a row and a flip-flop clocked by the second.
@@ -233,7 +227,7 @@ mod tests {
         let z = m.wire("Z");
         let q = m.output("Q");
         m.gate_into(CellKind::Inv, &[a], z);
-        m.cell("ff", CellKind::Dffr, &[d, z, r], &[q, Net::NONE]);
+        m.cell("ff", CellKind::Dffr, &[d, z, r], &[Some(q), None]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let net = |name| netlist.net(name).unwrap();
         let mut drives = vec![
@@ -247,9 +241,11 @@ mod tests {
         }
         let from = Time::from_ns(5);
         let mut activity = Activity::new(&netlist, from);
-        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let end = Time::from_ns(30);
-        Kernel::new(&netlist, &timing).run(&mut in_order(drives), end, &mut activity);
+        Kernel::new(&netlist, &timing)
+            .run(&mut Stimulus::sorted(drives), end, &mut activity)
+            .expect("no loop of cells without delay");
         let nets = activity.until(end);
         assert_eq!(nets[net("A").index()].toggles, 10);
         assert_eq!(nets[net("Q").index()].toggles, 1);

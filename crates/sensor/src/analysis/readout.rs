@@ -7,7 +7,7 @@ use super::gates;
 use crate::chip::readout::{ReadoutOrder, with_counts};
 use crate::chip::{Limits, ReadPins, ReadProbe, SensorConfig, Silicon};
 use crate::engine::readout::{PinSampler, READ_ENABLED, power_up};
-use crate::kernel::{Kernel, TimingChecks, in_order};
+use crate::kernel::{Kernel, Stimulus, TimingChecks};
 use crate::logic::Logic;
 use crate::netlist::{CheckKind, Edge, NetId, Netlist, Requirement, Requirements, StaticTiming};
 use crate::stimulus::read_stimulus;
@@ -77,7 +77,7 @@ impl ReadTiming {
             let limits = library.checks(cell.kind);
             Edge::BOTH.map(|edge| {
                 let setup = limits.toward(CheckKind::Setup, edge, silicon.corner);
-                let window = from_words.edge_window(cell.inputs[0], edge);
+                let window = from_words.edge_window(cell.input(0), edge);
                 window.map(|(_, last)| last + Time::from_fs(setup.into()))
             })
         });
@@ -129,15 +129,21 @@ pub fn read_works(
             TimingChecks::new(&netlist, &library, corner).not_before(gates::RESET_RELEASED);
         let mut kernel = Kernel::new(&netlist, &timing);
         let (end, mut read) = read_stimulus(&pins, clock, READ_ENABLED, order.periods());
-        let mut power_up = in_order(power_up(&netlist, &order, &counts));
-        kernel.run(
-            &mut power_up,
-            READ_ENABLED,
-            &mut (&mut sampler, &mut checks),
-        );
+        let mut power_up = Stimulus::sorted(power_up(&netlist, &order, &counts));
+        kernel
+            .run(
+                &mut power_up,
+                READ_ENABLED,
+                &mut (&mut sampler, &mut checks),
+            )
+            .expect("no loop of cells without delay");
         match limits {
-            Limits::Kept => kernel.run(&mut read, end, &mut (&mut sampler, &mut checks)),
-            Limits::Ignored => kernel.run(&mut read, end, &mut sampler),
+            Limits::Kept => kernel
+                .run(&mut read, end, &mut (&mut sampler, &mut checks))
+                .expect("no loop of cells without delay"),
+            Limits::Ignored => kernel
+                .run(&mut read, end, &mut sampler)
+                .expect("no loop of cells without delay"),
         }
         let found = sampler.counts(&order);
         let is_right = found.iter().zip(&counts).all(|(a, b)| *a == Some(*b));

@@ -16,7 +16,7 @@ use crate::chip::{
     Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, WindowLaw, array, load_path,
     metdc_delay_line,
 };
-use crate::kernel::{Drive, Kernel, LANES, Observer, Policy, Statistics, TimingChecks, merge};
+use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, Stimulus, TimingChecks};
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::stimulus::{
@@ -162,10 +162,14 @@ impl GateSimulation {
         let pins = SensorPins::of(&self.netlist);
         let mut stimulus = self.plan.stimulus(&pins);
         if let Some((rest, states)) = self.preset.take() {
-            self.kernel.run(&mut stimulus, rest, observer);
+            self.kernel
+                .run(&mut stimulus, rest, observer)
+                .expect("no loop of cells without delay");
             self.kernel.preset(states, observer);
         }
-        self.kernel.run(&mut stimulus, until, observer);
+        self.kernel
+            .run(&mut stimulus, until, observer)
+            .expect("no loop of cells without delay");
     }
 
     /// Reads all counts through the pins, after [`GateSimulation::run`] and as often as one likes; at the same time the start values
@@ -185,7 +189,7 @@ impl GateSimulation {
             load_path::stream(&codes, self.plan.order.cols, self.sensor.counter_bits)
         });
         let (others_end, others) = match &stream {
-            None => (now, merge([])),
+            None => (now, Stimulus::new([])),
             Some(stream) => {
                 let clock = self.sensor.load_clock();
                 let times = (now, now + clock.period());
@@ -196,13 +200,13 @@ impl GateSimulation {
         let pins = ReadPins::of(&self.netlist);
         let (clock, start) = (self.sensor.read_clock(), self.kernel.now());
         let (end, read) = read_stimulus(&pins, clock, start, order.periods());
-        let streams: [Box<dyn Iterator<Item = Drive> + Send>; 2] =
-            [Box::new(read), Box::new(others)];
-        let mut stimulus = merge(streams);
+        let mut stimulus = read.with(others);
         let mut sampler = PinSampler::new(&self.netlist, |net| self.kernel.value(net));
         let mut observers = (&mut sampler, observer);
         let settled = end.max(others_end) + clock.period();
-        self.kernel.run(&mut stimulus, settled, &mut observers);
+        self.kernel
+            .run(&mut stimulus, settled, &mut observers)
+            .expect("no loop of cells without delay");
         let mut histograms = Histograms::new(self.sensor.bins);
         let counts = sampler.counts(&order);
         for (probes, counts) in self.probes.iter().zip(counts.chunks(self.sensor.bins)) {

@@ -85,7 +85,9 @@ impl LaneSimulation {
     pub(super) fn run_until<O: LaneObserver>(&mut self, end: Time, observer: &mut O) {
         let pins = SensorPins::of(&self.netlist);
         let mut stimulus = self.stimulus(&pins).peekable();
-        self.kernel.run(&mut stimulus, end, observer);
+        self.kernel
+            .run(&mut stimulus, end, observer)
+            .expect("no loop of cells without delay");
     }
 
     fn stimulus(&self, pins: &SensorPins) -> impl Iterator<Item = LaneDrive> + use<> {

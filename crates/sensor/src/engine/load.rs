@@ -32,7 +32,9 @@ pub fn load(
     let timing = Silicon::of(config).timing(netlist);
     let mut kernel = Kernel::new(netlist, &timing);
     let settled = end + config.load_clock().periods(1);
-    kernel.run(&mut stimulus, settled, observer);
+    kernel
+        .run(&mut stimulus, settled, observer)
+        .expect("no loop of cells without delay");
     let memories = probes::memories(netlist, config.rows, config.cols);
     let start = |nets: &Vec<_>| {
         let code = kernel.number(nets)? as u16;

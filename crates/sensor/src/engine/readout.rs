@@ -4,7 +4,7 @@
 use super::load::{load, load_netlist};
 use crate::chip::readout::{ReadoutOrder, with_counts};
 use crate::chip::{LoadProbe, ReadPins, ReadProbe, SensorConfig, Silicon};
-use crate::kernel::{Drive, Kernel, Observer, Recorder, Statistics, Stimulus, in_order, merge};
+use crate::kernel::{Drive, Kernel, Observer, Recorder, Statistics, Stimulus};
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
 use crate::stimulus::read_stimulus;
@@ -124,22 +124,17 @@ pub fn read_out(
     let order = ReadoutOrder::of(config);
     let pins = ReadPins::of(netlist);
     let (end, read) = read_stimulus(&pins, config.read_clock(), READ_ENABLED, order.periods());
-    let mut stimulus = merge([
-        boxed(in_order(power_up(netlist, &order, counts))),
-        boxed(read),
-    ]);
+    let mut stimulus = Stimulus::sorted(power_up(netlist, &order, counts)).with(read);
     let mut kernel = Kernel::new(netlist, &Silicon::of(config).timing(netlist));
     let mut sampler = PinSampler::new(netlist, |_| Logic::X);
-    kernel.run(&mut stimulus, end, &mut (&mut sampler, observer));
+    kernel
+        .run(&mut stimulus, end, &mut (&mut sampler, observer))
+        .expect("no loop of cells without delay");
     Readout {
         counts: sampler.counts(&order),
         duration: config.readout_time(),
         statistics: kernel.statistics(),
     }
-}
-
-fn boxed(drives: Stimulus<'static>) -> Box<dyn Iterator<Item = Drive> + Send> {
-    Box::new(drives)
 }
 
 /// The readout of this sensor with pins for counts in place of its macropixels, elaborated.

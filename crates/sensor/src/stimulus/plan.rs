@@ -24,7 +24,7 @@ use crate::chip::readout::ReadoutOrder;
 use crate::chip::{
     Exposure, LoadPins, Mode, ReadPins, Sensor, SensorConfig, SensorPins, load_path,
 };
-use crate::kernel::{Drive, Stimulus, clock, merge};
+use crate::kernel::{Drive, Stimulus, clock};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
@@ -52,7 +52,7 @@ pub(crate) fn load_stimulus<'a>(
         Drive::new(RESET_END, pins.resetb, true),
     ];
     let (end, load) = reload_stimulus(pins, clock, (enabled, LOAD_START), stream);
-    (end, merge([boxed(power_up.into_iter()), boxed(load)]))
+    (end, Stimulus::new(power_up).with(load))
 }
 
 /// The serial load alone: LOAD_ENABLE rises at `enabled`, the first bit is there at `start`, and the time at which all bits
@@ -77,7 +77,7 @@ pub(crate) fn reload_stimulus<'a>(
             .then(|| Drive::new(half(k), pins.serial, stream[k as usize / 2]));
         std::iter::once(edge).chain(data)
     });
-    (end, merge([boxed(control.into_iter()), boxed(edges)]))
+    (end, Stimulus::new(control).with(edges))
 }
 
 /// Longer than delay lines take to be empty and CLK to come to the last column.
@@ -99,7 +99,7 @@ pub(crate) fn read_stimulus(
     let edges = (0..2 * periods as i64).map(move |k| Drive::new(half(k), clk, k % 2 == 0));
     let begin = std::iter::once(Drive::new(start, enable, true));
     let close = std::iter::once(Drive::new(end, enable, false));
-    (end, merge([boxed(begin.chain(edges).chain(close))]))
+    (end, Stimulus::new(begin.chain(edges).chain(close)))
 }
 
 /// Where load and exposure lie in simulation time.
@@ -242,13 +242,13 @@ impl StimulusPlan {
 
     /// All drives in time order.
     pub fn stimulus(&self, pins: &SensorPins) -> Stimulus<'_> {
-        merge([
-            boxed(self.control(pins).into_iter()),
-            boxed(load_stimulus(pins.load, self.sensor.load_clock(), &self.stream).1),
-            boxed(self.clk(pins)),
-            boxed(self.stop(pins)),
-            boxed(self.spads(pins)),
-            boxed(self.read(pins)),
+        Stimulus::merge([
+            Stimulus::new(self.control(pins)),
+            load_stimulus(pins.load, self.sensor.load_clock(), &self.stream).1,
+            Stimulus::new(self.clk(pins)),
+            Stimulus::new(self.stop(pins)),
+            Stimulus::new(self.spads(pins)),
+            Stimulus::new(self.read(pins)),
         ])
     }
 
@@ -360,17 +360,11 @@ impl StimulusPlan {
             let drives = driven
                 .iter()
                 .map(move |pulse| Drive::new(origin + pulse.1.time + offset, net(pulse), value));
-            boxed(odd.chain(drives.take_while(move |d| d.time <= end)))
+            Stimulus::new(odd.chain(drives.take_while(move |d| d.time <= end)))
         };
-        merge([edges(Time::ZERO, true), edges(width, false)])
+        Stimulus::merge([edges(Time::ZERO, true), edges(width, false)])
     }
 }
 
 /// Half CLK periods that CLK goes on after the last STOP edge.
 const LAST_HALF_PERIODS: i64 = 2;
-
-fn boxed<'a>(
-    drives: impl Iterator<Item = Drive> + Send + 'a,
-) -> Box<dyn Iterator<Item = Drive> + Send + 'a> {
-    Box::new(drives)
-}

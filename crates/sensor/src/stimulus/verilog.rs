@@ -21,11 +21,11 @@ use super::plan::StimulusPlan;
 use crate::chip::readout::ReadoutOrder;
 use crate::chip::{ReadProbe, SensorConfig, SensorPins, Silicon, array, probes};
 use crate::files::{InputError, OutputFile, create_folder};
-use crate::netlist::{
-    Chain, Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
-    write_parametric_cells, write_standard_cells,
-};
+use crate::netlist::{Chain, Corner, Direction, Module, Netlist, Timing};
 use crate::units::Time;
+use crate::verilog::{
+    write_cells, write_delays, write_modules, write_parametric_cells, write_standard_cells,
+};
 
 /// What is exported of a sensor.
 #[derive(Clone, Copy)]

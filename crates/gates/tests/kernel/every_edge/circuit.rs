@@ -201,7 +201,7 @@ impl Case {
             typ_fs: fs(),
             max_fs: fs(),
         };
-        let mut library = Library::default();
+        let mut library = Library::generic_40nm();
         for kind in CellKind::ALL {
             let has = |mask: u16| mask >> kind as u16 & 1 == 1;
             let mut arc = || TimingArc {

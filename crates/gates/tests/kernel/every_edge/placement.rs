@@ -54,8 +54,8 @@ pub fn placed(
 
 /// A cell or an instance with its connections, still to be placed.
 enum Pending<'a> {
-    Cell(CellKind, Vec<Net>, Vec<Net>),
-    Instance(&'a Arc<Module>, Vec<(String, Vec<Net>)>),
+    Cell(CellKind, Vec<Net>, Vec<Option<Net>>),
+    Instance(&'a Arc<Module>, Vec<(String, Vec<Option<Net>>)>),
 }
 
 /// A module being built from its recipe.
@@ -94,12 +94,7 @@ impl<'a> Placement<'a> {
         let outputs = self.declare_outputs();
         let is_early = |item| has_gate_loops || self.kind(item).is_some_and(|k| k.is_flip_flop());
         let early: Vec<bool> = recipe.items.iter().map(is_early).collect();
-        let known = |nets: &[Net]| {
-            nets.iter()
-                .copied()
-                .filter(|n| n.is_some())
-                .collect::<Vec<_>>()
-        };
+        let known = |nets: &[Option<Net>]| nets.iter().copied().flatten().collect::<Vec<_>>();
         for (nets, _) in outputs.iter().zip(&early).filter(|(_, early)| **early) {
             self.pool.extend(known(nets));
         }
@@ -127,11 +122,12 @@ impl<'a> Placement<'a> {
                     self.builder.cell(&name, kind, &inputs, &outputs);
                 }
                 Pending::Instance(module, connections) => {
-                    let connections: Vec<(&str, &[Net])> = connections
+                    let connections: Vec<(&str, Vec<Option<Net>>)> = connections
                         .iter()
-                        .map(|(name, nets)| (name.as_str(), nets.as_slice()))
+                        .map(|(port, nets)| (port.as_str(), nets.clone()))
                         .collect();
-                    self.builder.instance(&name, module, &connections);
+                    self.builder
+                        .instance_with_open_bits(&name, module, &connections);
                 }
             }
         }
@@ -182,7 +178,7 @@ impl<'a> Placement<'a> {
     }
 
     /// Declares the nets of every item's outputs.
-    fn declare_outputs(&mut self) -> Vec<Vec<Net>> {
+    fn declare_outputs(&mut self) -> Vec<Vec<Option<Net>>> {
         let recipe = self.recipe;
         let places: Vec<Vec<Output>> = recipe
             .items
@@ -201,13 +197,13 @@ impl<'a> Placement<'a> {
             port_bus = builder.output_bus("OUTS", ports);
         }
         let (mut wire_bus, mut port_bus) = (wire_bus.into_iter(), port_bus.into_iter());
-        let mut nets: Vec<Vec<Net>> = Vec::new();
+        let mut nets: Vec<Vec<Option<Net>>> = Vec::new();
         for (index, places) in places.iter().enumerate() {
             let net = |(bit, place): (usize, &Output)| match place {
-                Output::Port => builder.output(&format!("O{index}_{bit}")),
-                Output::WireBus => wire_bus.next().expect("counted"),
-                Output::PortBus => port_bus.next().expect("counted"),
-                Output::Wire | Output::Open => Net::NONE,
+                Output::Port => Some(builder.output(&format!("O{index}_{bit}"))),
+                Output::WireBus => wire_bus.next(),
+                Output::PortBus => port_bus.next(),
+                Output::Wire | Output::Open => None,
             };
             nets.push(places.iter().enumerate().map(net).collect());
         }
@@ -215,7 +211,7 @@ impl<'a> Placement<'a> {
         for &index in &self.order {
             for (bit, place) in places[index].iter().enumerate() {
                 if *place == Output::Wire {
-                    nets[index][bit] = builder.wire(&format!("W{index}_{bit}"));
+                    nets[index][bit] = Some(builder.wire(&format!("W{index}_{bit}")));
                 }
             }
         }
@@ -233,7 +229,7 @@ impl<'a> Placement<'a> {
         }
     }
 
-    fn cell(&self, kind: CellKind, item: &Item, outputs: &[Net]) -> Pending<'a> {
+    fn cell(&self, kind: CellKind, item: &Item, outputs: &[Option<Net>]) -> Pending<'a> {
         let inputs = (0..kind.inputs().len())
             .map(|pin| {
                 let choice = item.pins[pin];
@@ -248,15 +244,15 @@ impl<'a> Placement<'a> {
         Pending::Cell(kind, inputs, outputs.to_vec())
     }
 
-    fn instance(&self, item: &Item, outputs: &[Net]) -> Pending<'a> {
+    fn instance(&self, item: &Item, outputs: &[Option<Net>]) -> Pending<'a> {
         let child = self.child(item);
-        let mut connections: Vec<(String, Vec<Net>)> = Vec::new();
+        let mut connections: Vec<(String, Vec<Option<Net>>)> = Vec::new();
         for (port, (name, width)) in ports(child, Direction::Input).enumerate() {
             // Neighbours become a slice of a bus, where they lie in one.
             let first = item.pins[port % MOST_INPUTS];
             let bit = |bit: usize| match first & 1 {
-                1 => self.pool[(first as usize / 2 + bit) % self.pool.len()],
-                _ => self.choose(item.pins[(port + bit) % MOST_INPUTS]),
+                1 => Some(self.pool[(first as usize / 2 + bit) % self.pool.len()]),
+                _ => Some(self.choose(item.pins[(port + bit) % MOST_INPUTS])),
             };
             connections.push((name.to_owned(), (0..width).map(bit).collect()));
         }

@@ -97,7 +97,7 @@ pub fn subarray(
         "run",
         CellKind::Dffr,
         &[enable, stop, reset],
-        &[run, Net::NONE],
+        &[Some(run), None],
     );
     m.gate_into(CellKind::Or2, &[reset, histogram_clear], pixel_clear);
     let (row_bits, load) = load_path::place(&mut m, rows, cols, bits, [load_enable, resetb]);

@@ -41,7 +41,7 @@ fn bin_register(bits: usize) -> Arc<Module> {
             &format!("bit_{bit}"),
             CellKind::Dffr,
             &[data, clk, clear],
-            &[count[bit], Net::NONE],
+            &[Some(count[bit]), None],
         );
     }
     finished(m.finish())

@@ -41,11 +41,11 @@ pub fn deserialiser(cols: usize, bits: usize) -> Arc<Module> {
             &format!("shift_{stage}"),
             Dffr,
             &[data, clk, reset],
-            &[row[stage], Net::NONE],
+            &[Some(row[stage]), None],
         );
     }
     let last = bit_counter(&mut m, clk, reset, length);
-    m.cell("row_done", Dffr, &[last, clk, reset], &[done, Net::NONE]);
+    m.cell("row_done", Dffr, &[last, clk, reset], &[Some(done), None]);
     finished(m.finish())
 }
 
@@ -107,14 +107,14 @@ pub fn row_scanner(rows: usize) -> Arc<Module> {
         "token_0",
         Dffr,
         &[from_last, step, reset],
-        &[Net::NONE, select[0]],
+        &[None, Some(select[0])],
     );
     for row in 1..rows {
         m.cell(
             &format!("token_{row}"),
             Dffr,
             &[select[row - 1], step, reset],
-            &[select[row], Net::NONE],
+            &[Some(select[row]), None],
         );
     }
     for (&selected, &load) in select.iter().zip(&load) {

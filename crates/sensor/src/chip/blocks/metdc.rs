@@ -48,7 +48,7 @@ pub fn circuit(bins: usize) -> Arc<Module> {
             &format!("shift_{stage}"),
             CellKind::Dffr,
             &[data, clk, clear],
-            &[shift[stage], Net::NONE],
+            &[Some(shift[stage]), None],
         );
     }
     for bin in 0..bins {
@@ -56,7 +56,7 @@ pub fn circuit(bins: usize) -> Arc<Module> {
             &format!("hit_{bin}"),
             CellKind::Dffr,
             &[shift[bins - 1 - bin], strobe, hit_reset],
-            &[hit[bin], Net::NONE],
+            &[Some(hit[bin]), None],
         );
     }
     finished(m.finish())

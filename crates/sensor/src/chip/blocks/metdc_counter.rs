@@ -65,13 +65,13 @@ pub fn circuit(bins: usize) -> Arc<Module> {
         "start",
         CellKind::Dffr,
         &[counts, strobe, start_reset],
-        &[start, Net::NONE],
+        &[Some(start), None],
     );
     m.cell(
         "counting",
         CellKind::Dffr,
         &[start, clk, clear],
-        &[counting, Net::NONE],
+        &[Some(counting), None],
     );
     // The bits of a number, each as it must be.
     let is_code = |number: usize| -> Vec<Net> {

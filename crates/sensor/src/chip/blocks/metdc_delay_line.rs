@@ -82,7 +82,7 @@ pub fn circuit(bins: usize, elements: &Elements) -> Arc<Module> {
         "odd",
         CellKind::Dffr,
         &[init, load, memory_reset],
-        &[odd, Net::NONE],
+        &[Some(odd), None],
     );
 
     let changes = LINES.map(|line| {
@@ -102,7 +102,7 @@ pub fn circuit(bins: usize, elements: &Elements) -> Arc<Module> {
                 &format!("{prefix}_sample_{number}"),
                 CellKind::Dffr,
                 &[tap, sample_clk, clear],
-                &[sample, Net::NONE],
+                &[Some(sample), None],
             );
         }
         let pairs = samples.windows(2);
@@ -117,7 +117,7 @@ pub fn circuit(bins: usize, elements: &Elements) -> Arc<Module> {
             &format!("hit_{bin}"),
             CellKind::Dffr,
             &[data, strobe, hit_reset],
-            &[hit, Net::NONE],
+            &[Some(hit), None],
         );
     }
     finished(m.finish())

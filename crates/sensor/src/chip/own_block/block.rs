@@ -8,8 +8,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::files::read_text_within;
+use crate::liberty::Liberty;
 use crate::netlist::Module;
-use crate::netlist::liberty::Liberty;
 use crate::settings::{Range, Setting};
 
 /// Most bytes of a file: more than [`Module::from_yosys`] takes, which then says so.

@@ -12,7 +12,9 @@ use crate::chip::config::{SensorConfig, Tdc};
 use crate::chip::probes::{Probe, Probes, reached};
 use crate::chip::timing::silicon::Silicon;
 use crate::chip::{correlation, front_end, histogram, metdc};
-use crate::netlist::{Arrivals, Corner, Direction, Edge, Module, NetId, Netlist, StaticTiming};
+use crate::netlist::{
+    Arrivals, Corner, Direction, Edge, FlatCell, Module, NetId, Netlist, StaticTiming,
+};
 
 /// What a block's netlist must be.
 pub(crate) struct Contract {
@@ -183,8 +185,7 @@ impl Contract {
                 .cells()
                 .iter()
                 .filter(|cell| cell.kind.is_flip_flop());
-            let outputs = flip_flops.flat_map(|cell| cell.outputs);
-            starts.extend(outputs.filter(|net| net.is_some()));
+            starts.extend(flip_flops.flat_map(FlatCell::output_nets));
         }
         let starts: Vec<_> = starts
             .into_iter()
@@ -213,8 +214,8 @@ fn p_counter(found: &Found<'_>) -> Option<String> {
     let after = found.after(&[clk], &[Edge::Rise]);
     let mut cells = found.netlist.cells().iter();
     let counts = cells.any(|cell| {
-        let is_clocked = cell.kind.is_flip_flop() && cell.inputs[1] == clk;
-        is_clocked && after.window(cell.inputs[0]).is_some()
+        let is_clocked = cell.kind.is_flip_flop() && cell.input(1) == clk;
+        is_clocked && after.window(cell.input(0)).is_some()
     });
     let stop = found.probes.net(Probe::LocalStop);
     let stops = after.edge_window(stop, Edge::Rise).is_some();
@@ -225,7 +226,7 @@ fn p_counter(found: &Found<'_>) -> Option<String> {
     // Its timing would have no path behind a reset that is cut at its start.
     let reset = found.probes.net(Probe::CounterReset);
     let mut flip_flops = (found.netlist.cells().iter()).filter(|cell| cell.kind.is_flip_flop());
-    if flip_flops.any(|cell| cell.inputs[1] == reset) {
+    if flip_flops.any(|cell| cell.input(1) == reset) {
         return Some("clocks a flip-flop with COUNTER_RESET; reset it by that instead".to_owned());
     }
     None
@@ -245,7 +246,7 @@ fn front_end(found: &Found<'_>) -> Option<String> {
     let samplers: Vec<usize> = probes.samplers(netlist).collect();
     let is_sampled = |raw: &NetId| {
         let reached = reached(netlist, 0..netlist.cells().len(), &[*raw]);
-        let mut data = samplers.iter().map(|&cell| netlist.cells()[cell].inputs[0]);
+        let mut data = samplers.iter().map(|&cell| netlist.cells()[cell].input(0));
         data.any(|net| reached.contains(&net))
     };
     if let Some(spad) = probes
@@ -282,22 +283,22 @@ fn metdc(found: &Found<'_>) -> Option<String> {
     let cells = probes.find_hit_cells(netlist).unwrap_or_default();
     let mut cells = cells
         .into_iter()
-        .map(|cell| &netlist.cells()[cell].inputs)
+        .map(|cell| &netlist.cells()[cell])
         .peekable();
-    let Some(&first) = cells.peek() else {
+    let Some(first) = cells.peek().copied() else {
         return Some("has a HIT that no flip-flop drives, whose glitches would be counted; make each bit of it one flip-flop's output".to_owned());
     };
     let hits: Vec<_> = cells.collect();
-    if hits.iter().any(|inputs| inputs[1..] != first[1..]) {
+    if hits.iter().any(|hit| hit.inputs[1..] != first.inputs[1..]) {
         return Some(
             "has HIT flip-flops of several clocks or resets; give them one of each".to_owned(),
         );
     }
     TO_HIT.into_iter().find_map(|(from, edge, pin, to)| {
         let after = found.after(&[probes.net(from)], &[edge]);
-        let leads = |inputs: &&[NetId; 4]| match to {
-            Some(to) => after.edge_window(inputs[pin], to).is_some(),
-            None => after.window(inputs[pin]).is_some(),
+        let leads = |cell: &&FlatCell| match to {
+            Some(to) => after.edge_window(cell.input(pin), to).is_some(),
+            None => after.window(cell.input(pin)).is_some(),
         };
         let words = |edge| match edge {
             Edge::Rise => "rises",

@@ -46,7 +46,11 @@ pub(super) fn hidden_state(module: &Arc<Module>, expected: Expected) -> Option<S
     let netlist = &Netlist::elaborate(module);
     let counter = &Counter::new(netlist);
     let idle = counter.values(&[(Probe::MemoryLoad, false)], &[]);
-    if let Some((bit, cell)) = counter.path(Probe::CounterInit, &idle, counter.local_stop()) {
+    if let Some((bit, cell)) = counter.path(
+        Probe::CounterInit,
+        &idle,
+        [Some(counter.local_stop()), None],
+    ) {
         return Some(format!(
             "uses COUNTER_INIT[{bit}] after the load, because {cell} leads it to LOCAL_STOP; \
              store it with posedge MEMORY_LOAD, and use what is stored"
@@ -55,10 +59,8 @@ pub(super) fn hidden_state(module: &Arc<Module>, expected: Expected) -> Option<S
     let cone = counter.cone(&idle);
     // What only a load can change.
     let is_stored = |&cell: &usize| {
-        let FlatCell { kind, inputs, .. } = &netlist.cells()[cell];
-        let pins = 1..kind.inputs().len();
-        pins.into_iter()
-            .all(|pin| idle[inputs[pin].index()] != Value::Any)
+        let mut controls = netlist.cells()[cell].input_nets().skip(1);
+        controls.all(|net| idle[net.index()] != Value::Any)
     };
     let (memory, counting): (Vec<usize>, Vec<usize>) =
         cone.iter().partition(|cell| is_stored(cell));
@@ -81,7 +83,11 @@ pub(super) fn hidden_state(module: &Arc<Module>, expected: Expected) -> Option<S
         }
     }
     if !expected.has_memory
-        && let Some((_, cell)) = counter.path(Probe::CounterReset, &idle, counter.local_stop())
+        && let Some((_, cell)) = counter.path(
+            Probe::CounterReset,
+            &idle,
+            [Some(counter.local_stop()), None],
+        )
     {
         return Some(format!(
             "has a COUNTER_RESET that {cell} leads to LOCAL_STOP, although p_counter = \"memoryless\" says that no STOP resets it; \
@@ -150,11 +156,11 @@ impl<'n> Counter<'n> {
         let mut driver = vec![None; netlist.net_count()];
         let mut readers = vec![Vec::new(); netlist.net_count()];
         for (index, cell) in netlist.cells().iter().enumerate() {
-            for output in cell.outputs.iter().filter(|net| net.is_some()) {
+            for output in cell.output_nets() {
                 driver[output.index()] = Some(index);
             }
             for pin in 0..cell.kind.inputs().len() {
-                readers[cell.inputs[pin].index()].push((index, pin));
+                readers[cell.input(pin).index()].push((index, pin));
             }
         }
         let mut counter = Counter {
@@ -175,7 +181,7 @@ impl<'n> Counter<'n> {
         let (mut order, gates): (Vec<usize>, Vec<usize>) = (0..cells.len()).partition(is_flip_flop);
         let mut awaited = vec![0; cells.len()];
         for &gate in &gates {
-            let drivers = cells[gate].inputs.iter().filter(|net| net.is_some());
+            let drivers = cells[gate].input_nets();
             let drivers = drivers.filter_map(|net| self.driver[net.index()]);
             awaited[gate] = drivers.filter(|driver| !is_flip_flop(driver)).count();
         }
@@ -184,7 +190,8 @@ impl<'n> Counter<'n> {
         let mut next = first;
         while let Some(&gate) = order.get(next) {
             next += 1;
-            for &(reader, _) in &self.readers[cells[gate].outputs[0].index()] {
+            let reached = cells[gate].output_nets();
+            for &(reader, _) in reached.flat_map(|net| &self.readers[net.index()]) {
                 if !is_flip_flop(&reader) {
                     awaited[reader] -= 1;
                     if awaited[reader] == 0 {
@@ -200,18 +207,18 @@ impl<'n> Counter<'n> {
         self.probes.bus(Probe::CounterInit)
     }
 
-    /// LOCAL_STOP as what a path leads to.
-    fn local_stop(&self) -> [NetId; 2] {
-        [self.probes.net(Probe::LocalStop), NetId::NONE]
+    fn local_stop(&self) -> NetId {
+        self.probes.net(Probe::LocalStop)
     }
 
     /// A cell, as its user knows it: with the net that it drives, where that has a name.
     fn name(&self, cell: usize) -> String {
-        let FlatCell { kind, outputs, .. } = &self.netlist.cells()[cell];
+        let leaf = &self.netlist.cells()[cell];
+        let kind = leaf.kind;
         let path = self.netlist.cell_path(cell);
         let (_, cell) = path.split_once('.').expect("a cell is below the top");
-        let mut nets = outputs.iter().filter(|net| net.is_some());
-        match (nets.find_map(|&net| self.named(net)), kind.is_flip_flop()) {
+        let mut nets = leaf.output_nets();
+        match (nets.find_map(|net| self.named(net)), kind.is_flip_flop()) {
             (Some(net), true) => format!("flip-flop {net} ({cell})"),
             (Some(net), false) => format!("gate {cell} ({}, which drives {net})", kind.name()),
             (None, true) => format!("flip-flop {cell}"),
@@ -260,7 +267,9 @@ impl<'n> Counter<'n> {
                 };
                 let Value::Known(one) = value else { continue };
                 for (net, value) in cell.outputs.iter().zip([one, !one]) {
-                    if net.is_some() && values[net.index()] == Value::Any {
+                    if let Some(net) = net
+                        && values[net.index()] == Value::Any
+                    {
                         values[net.index()] = Value::Known(value);
                         is_settled = false;
                     }
@@ -273,7 +282,12 @@ impl<'n> Counter<'n> {
     }
 
     /// The first step of a path from a pin to any of `to`: the pin's bit, and the cell that reads it.
-    fn path(&self, from: Probe, values: &[Value], to: [NetId; 2]) -> Option<(usize, String)> {
+    fn path(
+        &self,
+        from: Probe,
+        values: &[Value],
+        to: [Option<NetId>; 2],
+    ) -> Option<(usize, String)> {
         let mut first: Vec<Option<(usize, usize)>> = vec![None; self.netlist.net_count()];
         let mut queue = VecDeque::new();
         for (bit, &net) in self.probes.bus(from).iter().enumerate() {
@@ -285,15 +299,15 @@ impl<'n> Counter<'n> {
                     continue;
                 }
                 let through = through.unwrap_or(cell);
-                for output in self.netlist.cells()[cell].outputs {
-                    if output.is_some() && first[output.index()].is_none() {
+                for output in self.netlist.cells()[cell].output_nets() {
+                    if first[output.index()].is_none() {
                         first[output.index()] = Some((bit, through));
                         queue.push_back((output, bit, Some(through)));
                     }
                 }
             }
         }
-        let to = to.iter().filter(|net| net.is_some());
+        let to = to.into_iter().flatten();
         let (bit, cell) = to.filter_map(|net| first[net.index()]).next()?;
         Some((bit, self.name(cell)))
     }
@@ -311,7 +325,7 @@ impl<'n> Counter<'n> {
             }
             let cell = &self.netlist.cells()[cell];
             let pins = (0..cell.kind.inputs().len()).filter(|&pin| passes(cell, pin, values));
-            nets.extend(pins.map(|pin| cell.inputs[pin]));
+            nets.extend(pins.map(|pin| cell.input(pin)));
         }
         let cells = (0..is_seen.len()).filter(|&cell| is_seen[cell]);
         cells
@@ -328,8 +342,8 @@ impl<'n> Counter<'n> {
             let is_any = |cell: &&usize| self.state(**cell, &values) == Value::Any;
             let left: Vec<usize> = counting.iter().filter(is_any).copied().collect();
             let is_kept = |cell: &&usize| {
-                let FlatCell { kind, inputs, .. } = &self.netlist.cells()[**cell];
-                (R..kind.inputs().len()).all(|pin| values[inputs[pin].index()] != Value::Any)
+                let mut controls = self.netlist.cells()[**cell].input_nets().skip(R);
+                controls.all(|net| values[net.index()] != Value::Any)
             };
             left.iter().find(is_kept).or(left.first()).copied()
         };
@@ -346,9 +360,9 @@ impl<'n> Counter<'n> {
     /// What a flip-flop holds.
     fn state(&self, cell: usize, values: &[Value]) -> Value {
         let [q, qn] = self.netlist.cells()[cell].outputs;
-        match (q.is_some(), qn.is_some()) {
-            (true, _) => values[q.index()],
-            (_, true) => match values[qn.index()] {
+        match (q, qn) {
+            (Some(q), _) => values[q.index()],
+            (_, Some(qn)) => match values[qn.index()] {
                 Value::Known(one) => Value::Known(!one),
                 Value::Any => Value::Any,
             },
@@ -359,9 +373,9 @@ impl<'n> Counter<'n> {
 
 /// What a flip-flop that holds `held` holds while its reset and set are these.
 fn state(cell: &FlatCell, values: &[Value], held: Value) -> Value {
-    let reset = values[cell.inputs[R].index()];
+    let reset = values[cell.input(R).index()];
     let set = match cell.kind {
-        CellKind::Dffsr => values[cell.inputs[S].index()],
+        CellKind::Dffsr => values[cell.input(S).index()],
         _ => Value::Known(false),
     };
     match (reset, set) {
@@ -381,8 +395,8 @@ fn outputs<'c>(
     (0..1usize << pins).filter_map(move |word| {
         let bit = |pin: usize| word >> pin & 1 == 1;
         let is_possible = (0..pins).all(|pin| {
-            let net = cell.inputs[pin];
-            let other = cell.inputs.iter().position(|&other| other == net);
+            let net = cell.input(pin);
+            let other = cell.input_nets().position(|other| other == net);
             let is_equal = other.is_none_or(|other| bit(other) == bit(pin));
             is_equal && values[net.index()] != Value::Known(!bit(pin))
         });
@@ -405,17 +419,17 @@ fn output(cell: &FlatCell, values: &[Value]) -> Value {
 
 /// Whether a change at a pin can change what a cell drives.
 fn passes(cell: &FlatCell, pin: usize, values: &[Value]) -> bool {
-    let value = |pin: usize| values[cell.inputs[pin].index()];
+    let value = |pin: usize| values[cell.input(pin).index()];
     if value(pin) != Value::Any {
         return false;
     }
     if cell.kind.is_flip_flop() {
-        let mut outputs = cell.outputs.iter().filter(|net| net.is_some());
+        let mut outputs = cell.output_nets();
         let moves = outputs.any(|net| values[net.index()] == Value::Any);
         return moves && (pin != D || value(CK) == Value::Any);
     }
-    let net = cell.inputs[pin];
-    let of_net = (0..cell.kind.inputs().len()).filter(|&other| cell.inputs[other] == net);
+    let net = cell.input(pin);
+    let of_net = (0..cell.kind.inputs().len()).filter(|&other| cell.input(other) == net);
     let flipped = of_net.fold(0, |word, pin| word | 1 << pin);
     let possible: Vec<(usize, bool)> = outputs(cell, values).collect();
     let output_of = |word: usize| possible.iter().find(|(known, _)| *known == word);
@@ -473,7 +487,9 @@ impl<'c> Load<'c> {
             values: Lanes::known(word),
         });
         self.now += SHORTEST_PAUSE;
-        self.kernel.run(&mut drives.peekable(), self.now, &mut ());
+        self.kernel
+            .run(&mut drives.peekable(), self.now, &mut ())
+            .expect("no loop of cells without delay");
     }
 
     fn set(&mut self, pin: Probe, value: bool) {
@@ -489,17 +505,16 @@ impl<'c> Load<'c> {
     fn ones(&self, cell: usize) -> u64 {
         let [q, qn] = self.counter.netlist.cells()[cell].outputs;
         self.used()
-            & if q.is_some() {
-                self.kernel.value(q).one
-            } else {
-                self.kernel.value(qn).zero
+            & match (q, qn) {
+                (Some(q), _) => self.kernel.value(q).one,
+                (None, Some(qn)) => self.kernel.value(qn).zero,
+                (None, None) => 0,
             }
     }
 
     /// Lanes in which nobody knows what a flip-flop holds.
     fn unknown(&self, cell: usize) -> u64 {
-        let outputs = self.counter.netlist.cells()[cell].outputs;
-        let net = outputs.into_iter().find(|net| net.is_some());
+        let net = self.counter.netlist.cells()[cell].output_nets().next();
         let known = net.map(|net| self.kernel.value(net));
         self.used() & !known.map_or(u64::MAX, |known| known.one | known.zero)
     }
@@ -507,7 +522,7 @@ impl<'c> Load<'c> {
     /// A flip-flop that is not the same when LOCAL_STOP rises for the second time as when it rose first.
     fn changed_by_a_round(mut self, counting: &[usize], expected: Expected) -> Option<usize> {
         self.set(Probe::CounterReset, false);
-        let local_stop = self.counter.local_stop()[0];
+        let local_stop = self.counter.local_stop();
         let bits = self.counter.init().len();
         let mut first = vec![0; counting.len()];
         let (mut risen, mut done) = (0, 0);

@@ -280,7 +280,7 @@ mod tests {
                             &format!("of_{net:?}").replace(['(', ')'], "_"),
                             through,
                             &[first; 3],
-                            &[net, Net::NONE],
+                            &[Some(net), None],
                         ),
                         _ => m.gate_into(through, &[first], net),
                     }

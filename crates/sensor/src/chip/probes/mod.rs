@@ -388,8 +388,8 @@ impl Probes {
         let reached = reached(netlist, cells.clone(), from);
         let clk = self.net(Probe::Clk);
         cells.filter(move |&cell| {
-            let FlatCell { kind, inputs, .. } = &netlist.cells()[cell];
-            kind.is_flip_flop() && inputs[1] == clk && reached.contains(&inputs[0])
+            let cell = &netlist.cells()[cell];
+            cell.kind.is_flip_flop() && cell.input(1) == clk && reached.contains(&cell.input(0))
         })
     }
 
@@ -426,8 +426,10 @@ impl Probes {
     /// The HIT flip-flop of each bin, if each is one's output.
     pub(crate) fn find_hit_cells(&self, netlist: &Netlist) -> Option<Vec<usize>> {
         let cells = self.block_cells(netlist, METDC);
-        let drives = |cell: &FlatCell, hit| cell.kind.is_flip_flop() && cell.outputs.contains(hit);
-        let of_hit = |hit| {
+        let drives = |cell: &FlatCell, hit: NetId| {
+            cell.kind.is_flip_flop() && cell.outputs.contains(&Some(hit))
+        };
+        let of_hit = |&hit| {
             cells
                 .clone()
                 .find(|&cell| drives(&netlist.cells()[cell], hit))
@@ -474,8 +476,9 @@ impl Probes {
         let mut cells = self
             .timing_block_cells(netlist)
             .map(|c| &netlist.cells()[c]);
-        let inverter = cells.find(|cell| cell.kind == CellKind::Inv && cell.inputs[0] == enable);
-        inverter.expect("ENABLE has an inverter").outputs[0]
+        let inverter = cells.find(|cell| cell.kind == CellKind::Inv && cell.input(0) == enable);
+        let inverter = inverter.expect("ENABLE has an inverter");
+        inverter.outputs[0].expect("its output is read")
     }
 
     /// What makes COUNTER_RESET besides the pulse at STOP: reset and ENABLE.
@@ -487,12 +490,12 @@ impl Probes {
         let mut drivers = self
             .timing_block_cells(netlist)
             .map(|c| &netlist.cells()[c]);
-        let or = drivers.find(|cell| cell.outputs[0] == reset);
-        let inputs = or.expect("COUNTER_RESET has a driver").inputs;
-        if inputs[0] == pulse {
-            inputs[1]
+        let or = drivers.find(|cell| cell.outputs[0] == Some(reset));
+        let or = or.expect("COUNTER_RESET has a driver");
+        if or.input(0) == pulse {
+            or.input(1)
         } else {
-            inputs[0]
+            or.input(0)
         }
     }
 }
@@ -504,8 +507,8 @@ pub(crate) fn reached(netlist: &Netlist, cells: Range<usize>, from: &[NetId]) ->
         let before = reached.len();
         for cell in &netlist.cells()[cells.clone()] {
             let mut pins = (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin));
-            if pins.any(|pin| reached.contains(&cell.inputs[pin])) {
-                reached.extend(cell.outputs.iter().filter(|net| net.is_some()));
+            if pins.any(|pin| reached.contains(&cell.input(pin))) {
+                reached.extend(cell.output_nets());
             }
         }
         if reached.len() == before {

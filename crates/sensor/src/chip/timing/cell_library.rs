@@ -18,7 +18,7 @@ use super::library_text::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::files::instead_of;
-use crate::netlist::liberty::{Characterised, Environment, Liberty};
+use crate::liberty::{Characterised, Environment, Liberty};
 use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.
@@ -102,7 +102,7 @@ impl CellLibrary {
             let place = format!("{}:{}", files[e.file].display(), e.fault.line);
             (key, format!("{place}: {e}"))
         })?;
-        let mut environment = Environment::of(&liberty);
+        let mut environment = Environment::new(&liberty);
         if config.input_slew_ps > 0.0 {
             environment.input_slew_fs = config.input_slew_ps * 1e3;
         }
@@ -110,7 +110,7 @@ impl CellLibrary {
         // A kind's limits are the largest that any flip-flop of the QuantIC4x4's macropixel has.
         let mut nominal = liberty.nominal(&environment);
         let pixel = Netlist::elaborate(&macropixel::circuit(&SensorConfig::default()));
-        let placed = Characterised::of(&pixel, &liberty, &environment);
+        let placed = Characterised::new(&pixel, &liberty, &environment);
         let [(shortest_fs, of_shortest), (longest_fs, of_longest)] =
             placed.extreme_delays(&pixel, &liberty);
         if longest_fs > f64::from(u32::MAX) {
@@ -143,7 +143,7 @@ impl CellLibrary {
 
     /// Delays and limits of each kind of cell.
     pub fn cells(self) -> &'static Library {
-        static BUILT_IN: LazyLock<Library> = LazyLock::new(Library::default);
+        static BUILT_IN: LazyLock<Library> = LazyLock::new(Library::generic_40nm);
         self.0.map_or(&*BUILT_IN, |from_file| &from_file.nominal)
     }
 
@@ -185,7 +185,7 @@ impl FromFile {
 
     /// A netlist in its cells, each macropixel by itself.
     pub fn characterised(&self, netlist: &Netlist) -> Characterised {
-        Characterised::by_blocks(netlist, &self.liberty, &self.environment, |module| {
+        Characterised::with_blocks(netlist, &self.liberty, &self.environment, |module| {
             module.name() == macropixel::NAME
         })
     }

@@ -8,7 +8,7 @@ use std::path::Path;
 use flate2::read::MultiGzDecoder;
 
 use crate::files::{InputError, open_input};
-use crate::netlist::liberty::liberty_text;
+use crate::liberty::liberty_text;
 
 /// Most bytes of a library: the largest open ones have 60 MB a corner.
 const MOST_BYTES: u64 = 512 << 20;

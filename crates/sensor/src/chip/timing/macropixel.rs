@@ -82,8 +82,8 @@ impl MacropixelCircuit {
         let probes = Probes::of_macropixel(&netlist, position.0, position.1);
         let clk = probes.net(Probe::Clk);
         let data = |cell: &FlatCell| {
-            let is_clocked = cell.kind.is_flip_flop() && cell.inputs[1] == clk;
-            is_clocked.then_some(cell.inputs[0])
+            let is_clocked = cell.kind.is_flip_flop() && cell.input(1) == clk;
+            is_clocked.then(|| cell.input(0))
         };
         let has_own = config.front_end_block.is_some() || config.metdc_block.is_some();
         let adds = config.tdc == Tdc::Counter;
@@ -98,7 +98,7 @@ impl MacropixelCircuit {
             sampled: match config.front_end.joins() || config.front_end_block.is_some() {
                 true => probes
                     .samplers(&netlist)
-                    .map(|cell| netlist.cells()[cell].inputs[0])
+                    .map(|cell| netlist.cells()[cell].input(0))
                     .collect(),
                 false => Vec::new(),
             },
@@ -205,7 +205,7 @@ impl MacropixelCircuit {
     }
 
     fn pin(&self, cell: usize, pin: usize) -> NetId {
-        self.netlist.cells()[cell].inputs[pin]
+        self.netlist.cells()[cell].input(pin)
     }
 }
 
@@ -281,8 +281,8 @@ impl<'c> MacropixelPaths<'c> {
         let count = probes.bin(0)[0];
         let mut cells = self.circuit.netlist.cells().iter();
         let flip_flop =
-            cells.find(|cell| cell.kind.is_flip_flop() && cell.outputs.contains(&count))?;
-        let clock = flip_flop.inputs[1];
+            cells.find(|cell| cell.kind.is_flip_flop() && cell.outputs.contains(&Some(count)))?;
+        let clock = flip_flop.input(1);
         if clock == hit {
             return Some((flip_flop.kind, Time::ZERO, Time::ZERO));
         }
@@ -499,7 +499,9 @@ impl MacropixelDelays {
         let hits = hits.zip(circuit.probes.latched());
         let hits = hits.map(|(&cell, &hit)| {
             let outputs = &circuit.netlist.cells()[cell].outputs;
-            paths.clock_to_q(cell, usize::from(outputs[0] != hit)).0
+            paths
+                .clock_to_q(cell, usize::from(outputs[0] != Some(hit)))
+                .0
         });
         MacropixelDelays {
             latency: paths.front_end_latency(),

@@ -183,16 +183,15 @@ impl<'s> Expressions<'s> {
                 .survey
                 .spads
                 .iter()
-                .position(|&spad| spad == cell.inputs[1])
+                .position(|&spad| spad == cell.input(1))
             {
                 Some(spad) => self.node(Node::Toggle(spad)),
-                None => self.of_net(cell.inputs[0])?.delayed(1),
+                None => self.of_net(cell.input(0))?.delayed(1),
             };
             self.hold(q, starts, net)?;
             q.inverse_if(output == 1)
         } else {
-            let pins = cell.kind.inputs().len();
-            let inputs = cell.inputs[..pins].iter().map(|&n| self.of_net(n));
+            let inputs = cell.input_nets().map(|net| self.of_net(net));
             let inputs: Result<Vec<_>, _> = inputs.collect();
             self.gate(cell.kind, &inputs?)
         };

@@ -271,7 +271,7 @@ impl Leveliser<'_> {
                     let cell = &survey.netlist.cells()[index];
                     let relevant = survey.relevant(cell);
                     for pin in (0..cell.kind.inputs().len()).filter(|&pin| relevant[pin]) {
-                        let input = cell.inputs[pin];
+                        let input = cell.input(pin);
                         if survey.class(input) == Class::Stream {
                             if cell.kind.triggers(pin) {
                                 return Err(Unlevelled::Structure(survey.name(input)));
@@ -311,7 +311,7 @@ impl Leveliser<'_> {
         };
         let cell = survey.driver[net.index()].map(|(cell, _)| &survey.netlist.cells()[cell]);
         let canonical = match cell {
-            Some(cell) if inverted && cell.outputs[0].is_some() => cell.outputs[0],
+            Some(cell) if inverted => cell.outputs[0].unwrap_or(net),
             _ => net,
         };
         if let Some(&place) = self.places.get(&canonical) {

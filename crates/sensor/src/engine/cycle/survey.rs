@@ -79,8 +79,10 @@ impl Survey {
         let pins = SensorPins::of(&netlist);
         let mut driver = vec![None; netlist.net_count()];
         for (index, cell) in netlist.cells().iter().enumerate() {
-            for (output, net) in cell.outputs.iter().enumerate().filter(|(_, n)| n.is_some()) {
-                driver[net.index()] = Some((index, output));
+            for (output, net) in cell.outputs.iter().enumerate() {
+                if let Some(net) = net {
+                    driver[net.index()] = Some((index, output));
+                }
             }
         }
         let mut survey = Survey {
@@ -121,20 +123,17 @@ impl Survey {
         })
     }
 
-    /// Class of a net; an unconnected pin is a constant 0.
     pub(super) fn class(&self, net: NetId) -> Class {
-        if net.is_some() {
-            self.class[net.index()]
-        } else {
-            Class::Constant(false)
-        }
+        self.class[net.index()]
     }
 
     /// Which input pins of a cell can make a difference, given the constants.
     pub(super) fn relevant(&self, cell: &FlatCell) -> [bool; MAX_INPUTS] {
-        let constant = cell.inputs.map(|net| match self.class(net) {
-            Class::Constant(value) => Some(value),
-            _ => None,
+        let constant = cell.inputs.map(|net| match net.map(|net| self.class(net)) {
+            // A pin that the cell does not have.
+            None => Some(false),
+            Some(Class::Constant(value)) => Some(value),
+            Some(_) => None,
         });
         let pins = cell.kind.inputs().len();
         std::array::from_fn(|pin| {
@@ -181,7 +180,7 @@ impl Survey {
                 let mut settled = true;
                 for cell in &cells {
                     if reaches(cell, flags) {
-                        for net in cell.outputs.iter().filter(|n| n.is_some()) {
+                        for net in cell.output_nets() {
                             settled &= std::mem::replace(&mut flags[net.index()], true);
                         }
                     }
@@ -193,7 +192,7 @@ impl Survey {
         };
         spread(&mut moves, &|cell, moves| {
             (0..cell.kind.inputs().len())
-                .any(|pin| cell.kind.triggers(pin) && moves[cell.inputs[pin].index()])
+                .any(|pin| cell.kind.triggers(pin) && moves[cell.input(pin).index()])
         });
         for (net, _) in moves.iter().enumerate().filter(|(_, moves)| !**moves) {
             let shared = self.shared_initial(NetId::new(net));
@@ -204,12 +203,14 @@ impl Survey {
         loop {
             let mut settled = true;
             for cell in cells.iter().filter(|cell| !cell.kind.is_flip_flop()) {
-                let net = cell.outputs[0].index();
+                let Some(net) = cell.outputs[0].map(NetId::index) else {
+                    continue;
+                };
                 if !matches!(self.class[net], Class::Constant(_))
                     && self.relevant(cell) == [false; MAX_INPUTS]
                 {
                     let ones = (0..cell.kind.inputs().len())
-                        .filter(|&pin| self.class(cell.inputs[pin]) == Class::Constant(true));
+                        .filter(|&pin| self.class(cell.input(pin)) == Class::Constant(true));
                     let bits = ones.fold(0, |bits, pin| bits | 1 << pin);
                     self.class[net] = Class::Constant(output(cell.kind, bits));
                     moves[net] = false;
@@ -233,23 +234,24 @@ impl Survey {
         }
         spread(&mut differs, &|cell, differs| {
             let relevant = relevant[&key(cell)];
-            (0..MAX_INPUTS).any(|pin| relevant[pin] && differs[cell.inputs[pin].index()])
+            (0..MAX_INPUTS).any(|pin| relevant[pin] && differs[cell.input(pin).index()])
         });
 
         // Toggle flip-flops on a SPAD, and everything that CLK and gates make of them.
         let mut stream = vec![false; moves.len()];
         let class = &self.class;
-        let off = |net: NetId| !net.is_some() || class[net.index()] == Class::Constant(false);
+        let off =
+            |net: Option<NetId>| net.is_none_or(|net| class[net.index()] == Class::Constant(false));
         spread(&mut stream, &|cell, stream| {
-            let [d, ck, r, s] = cell.inputs;
             if cell.kind.is_flip_flop() {
-                let toggles = spads.contains(&ck) && d == cell.outputs[1];
+                let (d, ck, [_, _, r, s]) = (cell.input(0), cell.input(1), cell.inputs);
+                let toggles = spads.contains(&ck) && Some(d) == cell.outputs[1];
                 let samples = ck == self.clk && stream[d.index()];
                 return off(r) && off(s) && (toggles || samples);
             }
             let relevant = relevant[&key(cell)];
             let mut inputs = (0..MAX_INPUTS).filter(|&p| relevant[p]).peekable();
-            inputs.peek().is_some() && inputs.all(|p| stream[cell.inputs[p].index()])
+            inputs.peek().is_some() && inputs.all(|p| stream[cell.input(p).index()])
         });
         for net in (0..moves.len()).filter(|&net| moves[net]) {
             self.class[net] = match (differs[net], stream[net]) {
@@ -296,7 +298,7 @@ impl Survey {
     }
 }
 
-type FlatCellKey = (CellKind, [NetId; MAX_INPUTS]);
+type FlatCellKey = (CellKind, [Option<NetId>; MAX_INPUTS]);
 
 fn key(cell: &FlatCell) -> FlatCellKey {
     (cell.kind, cell.inputs)

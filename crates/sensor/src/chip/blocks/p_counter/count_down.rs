@@ -140,7 +140,8 @@ impl<'n> CountDown<'n> {
         };
         self.now += self.pause;
         self.kernel
-            .run(&mut drives.peekable(), self.now, &mut watch);
+            .run(&mut drives.peekable(), self.now, &mut watch)
+            .expect("no loop of cells without delay");
         watch
     }
 

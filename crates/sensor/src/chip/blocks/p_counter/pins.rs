@@ -21,7 +21,7 @@ pub(crate) fn memory(bits: usize) -> Arc<Module> {
             &format!("memory_{bit}"),
             CellKind::Dffr,
             &[init[bit], load, reset],
-            &[memory[bit], Net::NONE],
+            &[Some(memory[bit]), None],
         );
     }
     finished(m.finish())

@@ -33,7 +33,7 @@ pub fn circuit(rows: usize, bins: usize, word_periods: usize) -> Arc<Module> {
     let row = m.wire_bus("ROW", rows);
     let last = bit_counter(&mut m, clk, reset, word_periods);
     let not_last = m.gate(Inv, &[last]);
-    m.cell("busy", Dffr, &[not_last, clk, reset], &[Net::NONE, load]);
+    m.cell("busy", Dffr, &[not_last, clk, reset], &[None, Some(load)]);
     token(&mut m, "bin", &bin_read, load, [clk, reset]);
     let next_row = m.gate(And2, &[load, bin_read[bins - 1]]);
     token(&mut m, "row", &row, next_row, [clk, reset]);
@@ -55,8 +55,8 @@ fn token(m: &mut ModuleBuilder, name: &str, nets: &[Net], step: Net, [clk, reset
         };
         let next = m.gate(Mux2, &[own, before, step]);
         let outputs = match index {
-            0 => [first_n, net],
-            _ => [net, Net::NONE],
+            0 => [first_n, net].map(Some),
+            _ => [Some(net), None],
         };
         m.cell(
             &format!("{name}_{index}"),

@@ -48,7 +48,7 @@ pub fn circuit(cols: usize, most: usize, bits: usize) -> Arc<Module> {
             &format!("stage_{stage}"),
             CellKind::Dffr,
             &[data, clk, reset],
-            &[q, Net::NONE],
+            &[Some(q), None],
         );
         before = Some(q);
     }

@@ -35,7 +35,7 @@ pub fn circuit(bits: usize) -> Arc<Module> {
             &format!("{name}_first"),
             CellKind::Dffr,
             &pins,
-            &[first, Net::NONE],
+            &[Some(first), None],
         );
         let pins = [first, clk_n, clear];
         m.cell(

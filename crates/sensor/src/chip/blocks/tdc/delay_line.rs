@@ -15,7 +15,7 @@ use std::sync::Arc;
 use super::Steps;
 use crate::chip::blocks::finished;
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net, Netlist, Timing};
+use crate::netlist::{CellKind, Module, ModuleBuilder, Netlist, Timing};
 use crate::units::Time;
 
 /// A line of `elements` elements. Ports: START, STOP, TDC_RESET → SEEN\<elements\>.
@@ -37,7 +37,7 @@ pub fn circuit(elements: usize) -> Arc<Module> {
             &format!("seen_{element}"),
             CellKind::Dffr,
             &pins,
-            &[seen, Net::NONE],
+            &[Some(seen), None],
         );
         before = tap;
     }

@@ -72,8 +72,8 @@ impl CounterDelays {
         let all_data = circuit.counting.iter().map(|&cell| circuit.pin(cell, 0));
         let later_stages = paths.stage_clocks().filter(|&clock| clock != counter_clk);
         let controls = circuit.counting.iter().flat_map(|&cell| {
-            let leaf = &circuit.netlist.cells()[cell];
-            leaf.inputs[2..leaf.kind.inputs().len()].iter()
+            let inputs = circuit.netlist.cells()[cell].inputs;
+            inputs.into_iter().flatten().skip(2)
         });
         let hits = circuit.probes.latched().iter();
         let reset_settled = latest(all_data.map(|data| reset.window(data)));
@@ -82,9 +82,9 @@ impl CounterDelays {
             let over = latest(
                 controls
                     .clone()
-                    .map(|&net| fall.edge_window(net, Edge::Fall)),
+                    .map(|net| fall.edge_window(net, Edge::Fall)),
             );
-            let changes = earliest(controls.clone().map(|&net| rise.window(net)));
+            let changes = earliest(controls.clone().map(|net| rise.window(net)));
             Some(over? - changes?)
         };
         let load_pulse = if reset_settled.is_none() {
@@ -104,7 +104,7 @@ impl CounterDelays {
             released: latest(
                 controls
                     .clone()
-                    .map(|&net| release.edge_window(net, Edge::Fall)),
+                    .map(|net| release.edge_window(net, Edge::Fall)),
             )
             .unwrap_or(Time::ZERO),
             stage_to_stage_clock: paths.stage_to_stage_clock(&fall),

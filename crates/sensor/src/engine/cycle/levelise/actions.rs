@@ -15,7 +15,8 @@ impl Leveliser<'_> {
 
     /// Where a flip-flop's reset and set are found.
     fn control_bits(&mut self, cell: &FlatCell) -> Result<[Bit; 2], Unlevelled> {
-        Ok([self.bit(cell.inputs[2])?, self.bit(cell.inputs[3])?])
+        let mut bit = |net: Option<NetId>| net.map_or(Ok((ZERO, false)), |net| self.bit(net));
+        Ok([bit(cell.inputs[2])?, bit(cell.inputs[3])?])
     }
 
     /// Lanes of a clock mask in which the flip-flop is not held in the instant of the edge: the place of their mask, and
@@ -51,12 +52,8 @@ impl Leveliser<'_> {
         arrival_fs: i64,
     ) -> Result<usize, Unlevelled> {
         let cell = self.survey.netlist.cells()[index];
-        let d = cell.inputs[0];
-        let q = if cell.outputs[0].is_some() {
-            cell.outputs[0]
-        } else {
-            cell.outputs[1]
-        };
+        let d = cell.input(0);
+        let q = cell.output_nets().next().expect("an output is read");
         let (out, _) = self.bit(q)?;
         let [reset, set] = self.control_bits(&cell)?;
         let mut is_doubtful = false;
@@ -103,7 +100,7 @@ impl Leveliser<'_> {
         arrival_fs: i64,
     ) -> Result<(Code, bool), Unlevelled> {
         let survey = self.survey;
-        let data = cell.inputs[0];
+        let data = cell.input(0);
         let (register, output) = survey.driver[data.index()].expect("a stream net has a driver");
         if !survey.netlist.cells()[register].kind.is_flip_flop() {
             return Err(Unlevelled::Structure(survey.name(data)));
@@ -157,9 +154,8 @@ impl Leveliser<'_> {
         let times = Edge::BOTH.map(|edge| arrival.get(&(to.0, edge)).map(|window| window.1));
         let is_quiet = |from: i64, until: i64| {
             let inputs = cell
-                .inputs
-                .iter()
-                .flat_map(|&net| Edge::BOTH.map(|edge| (net, edge)));
+                .input_nets()
+                .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)));
             let mut times = inputs.filter_map(|node| arrival.get(&node));
             !times.any(|window| window.1 >= from && window.0 < until)
         };
@@ -204,12 +200,11 @@ impl Leveliser<'_> {
             .collect();
         let mut fixed = 0u8;
         for pin in 0..cell.kind.inputs().len() {
-            if self.survey.class(cell.inputs[pin]) == Class::Constant(true) {
+            if self.survey.class(cell.input(pin)) == Class::Constant(true) {
                 fixed |= 1 << pin;
             }
         }
-        let bits: Result<Vec<Bit>, _> =
-            pins.iter().map(|&pin| self.bit(cell.inputs[pin])).collect();
+        let bits: Result<Vec<Bit>, _> = pins.iter().map(|&pin| self.bit(cell.input(pin))).collect();
         let bits = bits?;
         let value = |on: u8| {
             let set = pins.iter().enumerate().filter(|(i, _)| on >> i & 1 == 1);
@@ -253,7 +248,12 @@ impl Leveliser<'_> {
             [(a, ia), (b, ib), (s, is)] if cell.kind == CellKind::Mux2 => {
                 action(Code::Mux, &[a, b, s], &[ia, ib, is], false)
             }
-            _ => return Err(Unlevelled::Structure(self.survey.name(cell.outputs[0]))),
+            _ => {
+                return Err(Unlevelled::Structure(
+                    self.survey
+                        .name(cell.outputs[0].expect("a gate that is read")),
+                ));
+            }
         })
     }
 }

@@ -8,7 +8,7 @@ struct ClockMasks {
     /// Their mask.
     all: Option<u16>,
     /// Those of them in which a reset and set do not hold, where that has to be found out at once.
-    unheld: HashMap<(NetId, NetId), u16>,
+    unheld: HashMap<(Option<NetId>, Option<NetId>), u16>,
     /// Drafts that find it out.
     drafts: Vec<usize>,
 }
@@ -48,8 +48,8 @@ impl Leveliser<'_> {
                 .outputs
                 .iter()
                 .enumerate()
-                .filter(|(_, net)| net.is_some());
-            let to = outputs.flat_map(|(output, &net)| {
+                .filter_map(|(output, net)| Some((output, (*net)?)));
+            let to = outputs.flat_map(|(output, net)| {
                 caused(leaf.kind, pin, from.1, output)
                     .iter()
                     .map(move |&edge| (net, edge))
@@ -67,7 +67,7 @@ impl Leveliser<'_> {
     /// Delay to one change of an output.
     fn delay(&self, arc: &Arc, to: Node) -> i64 {
         let outputs = self.survey.netlist.cells()[arc.cell].outputs;
-        let output = outputs.iter().position(|&net| net == to.0);
+        let output = outputs.iter().position(|&net| net == Some(to.0));
         let output = output.expect("an arc leads to an output");
         i64::from(self.survey.timing.of(arc.cell)[arc.pin][output].to(to.1.level()))
     }

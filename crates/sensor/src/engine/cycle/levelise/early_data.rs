@@ -63,8 +63,8 @@ impl Leveliser<'_> {
         (clock_fs, output_fs): (i64, i64),
     ) -> Result<(), Unlevelled> {
         let leaf = &self.survey.netlist.cells()[cell];
-        let data = leaf.inputs[0];
-        if leaf.outputs.contains(&data) || self.survey.class(data) == Class::Stream {
+        let data = leaf.input(0);
+        if leaf.outputs.contains(&Some(data)) || self.survey.class(data) == Class::Stream {
             return Ok(());
         }
         let changes = self.shared_edges.changes.get(&data);

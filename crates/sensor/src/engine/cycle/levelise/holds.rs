@@ -18,8 +18,7 @@ use super::*;
 impl Leveliser<'_> {
     /// Nets on a flip-flop's reset and set.
     fn controls_of(cell: &FlatCell) -> impl Iterator<Item = NetId> + use<> {
-        let nets = cell.inputs.into_iter().skip(CLOCK + 1);
-        nets.filter(|net| net.is_some())
+        cell.input_nets().skip(CLOCK + 1)
     }
 
     /// Flip-flops of the tape.
@@ -97,7 +96,7 @@ impl Leveliser<'_> {
         loop {
             let mut held = reach.held.clone();
             held.retain(|&cell| {
-                let edge = (cells[cell].inputs[CLOCK], Edge::Rise);
+                let edge = (cells[cell].input(CLOCK), Edge::Rise);
                 let removal = self.cell_library.checks(cells[cell].kind).removal;
                 reach.arrival.get(&edge).is_none_or(|&(_, late)| {
                     late + i64::from(removal.at(self.config.corner)) < self.hold_fs(cause, cell)

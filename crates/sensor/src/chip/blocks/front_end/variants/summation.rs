@@ -54,7 +54,7 @@ pub(super) fn retiming() -> Arc<Module> {
         &[toggle, toggle_n],
     );
     for (name, d, q) in [("first", toggle, first), ("second", first, second)] {
-        m.cell(name, CellKind::Dffr, &[d, clk, clear], &[q, Net::NONE]);
+        m.cell(name, CellKind::Dffr, &[d, clk, clear], &[Some(q), None]);
     }
     m.gate_into(CellKind::Xor2, &[first, second], timed);
     finished(m.finish())

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use super::summation::{JOINED, TOGGLE};
 use crate::chip::blocks::finished;
 use crate::chip::blocks::front_end::variant::{Variant, pins};
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::netlist::{CellKind, Module, ModuleBuilder};
 
 pub(crate) const VARIANT: Variant = Variant {
     circuit: |config| circuit(config.spads()),
@@ -50,7 +50,7 @@ fn sampler() -> Arc<Module> {
     let first = m.wire("FIRST");
     let second = m.wire("SECOND");
     for (name, d, q) in [("first", wire, first), ("second", first, second)] {
-        m.cell(name, CellKind::Dffr, &[d, clk, clear], &[q, Net::NONE]);
+        m.cell(name, CellKind::Dffr, &[d, clk, clear], &[Some(q), None]);
     }
     m.gate_into(CellKind::Xor2, &[first, second], timed);
     finished(m.finish())

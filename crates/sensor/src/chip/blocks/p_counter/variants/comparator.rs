@@ -20,7 +20,7 @@ use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
 use crate::chip::blocks::p_counter::variant::{Counter, Variant};
 use crate::chip::config::SensorConfig;
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::netlist::{CellKind, Module, ModuleBuilder};
 
 pub(crate) const VARIANT: Variant = Variant {
     model: |config, start| Box::new(Model::new(config.counter_bits, start)),
@@ -57,7 +57,7 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
         "stop",
         CellKind::Dffr,
         &[equal, pins.clk, pins.reset],
-        &[pins.local_stop, Net::NONE],
+        &[Some(pins.local_stop), None],
     );
     finished(m.finish())
 }

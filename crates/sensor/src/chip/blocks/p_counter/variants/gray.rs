@@ -32,7 +32,7 @@ use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
 use crate::chip::blocks::p_counter::variant::Variant;
 use crate::chip::config::{SensorConfig, Tap};
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::netlist::{CellKind, Module, ModuleBuilder};
 
 pub(crate) const VARIANT: Variant = Variant {
     code: |count| count ^ count >> 1,
@@ -78,13 +78,14 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
             is_clear = m.gate(CellKind::And2, &[is_clear, is_zero]);
         }
         // The borrow starts at 0 and needs no multiplexer.
-        let (name, outputs) = match bit == bits {
-            true => ("borrow".to_owned(), [pins.local_stop, Net::NONE]),
-            false => (format!("counter_{bit}"), [q[bit], qn[bit]]),
+        let (name, own, inverted) = if bit == bits {
+            ("borrow".to_owned(), pins.local_stop, None)
+        } else {
+            (format!("counter_{bit}"), q[bit], Some(qn[bit]))
         };
-        let next = m.gate(CellKind::Xor2, &[outputs[0], toggle]);
+        let next = m.gate(CellKind::Xor2, &[own, toggle]);
         let inputs = [next, pins.clk, pins.reset];
-        m.cell(&name, CellKind::Dffr, &inputs, &outputs);
+        m.cell(&name, CellKind::Dffr, &inputs, &[Some(own), inverted]);
         if bit < bits {
             let start = *start.get(bit).unwrap_or(&memory[bit]);
             let choice = [q[bit], qn[bit], start];

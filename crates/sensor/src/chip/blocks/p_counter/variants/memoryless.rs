@@ -31,7 +31,7 @@ use crate::chip::blocks::p_counter::pins::Pins;
 use crate::chip::blocks::p_counter::variant::Variant;
 use crate::chip::config::SensorConfig;
 use crate::chip::p_counter_timing::SHORTEST_CHAIN;
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::netlist::{CellKind, Module, ModuleBuilder};
 
 pub(crate) const VARIANT: Variant = Variant {
     nets: &["LOAD_PULSE"],
@@ -63,7 +63,7 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
             &format!("counter_{bit}"),
             CellKind::Dffsr,
             &[out, clock, set, clear],
-            &[Net::NONE, out],
+            &[None, Some(out)],
         );
         clock = out;
     }

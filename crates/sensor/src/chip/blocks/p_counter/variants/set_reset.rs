@@ -27,7 +27,7 @@ use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
 use crate::chip::blocks::p_counter::variant::Variant;
 use crate::chip::config::SensorConfig;
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::netlist::{CellKind, Module, ModuleBuilder};
 
 pub(crate) const VARIANT: Variant = Variant {
     nets: &["COUNTER_RESET_D"],
@@ -51,7 +51,7 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
             &format!("counter_{bit}"),
             CellKind::Dffsr,
             &[out[bit], clock, set, pins.reset],
-            &[Net::NONE, out[bit]],
+            &[None, Some(out[bit])],
         );
         clock = out[bit];
     }

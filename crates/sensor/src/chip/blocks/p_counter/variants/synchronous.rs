@@ -69,7 +69,7 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
                 "borrow",
                 CellKind::Dffr,
                 &[data, pins.clk, pins.reset],
-                &[pins.local_stop, Net::NONE],
+                &[Some(pins.local_stop), None],
             );
         }
         Tap::Msb => m.gate_into(CellKind::Buf, &[out[bits - 1]], pins.local_stop),

@@ -1,0 +1,495 @@
+//! The cells of a library that chips here can be made of: gates by their function, flip-flops by their `ff` group.
+//!
+//! ```text
+//!   every cell ─► Candidate: pins and function ─(the few that are chosen)─► CellModel: arcs, limits, capacitances
+//! ```
+
+use std::collections::BTreeSet;
+
+use super::complete::{self, Remark};
+use super::error::LibertyError;
+pub(crate) use super::flip_flop::FlipFlop;
+use super::function::{TruthTable, truth_table};
+use super::group::Group;
+use super::kit::LibraryFile;
+use super::leakage::leakage_of;
+use super::table::Table;
+use crate::netlist::{CheckKind, Edge};
+
+/// What a cell does, told without a look at its tables.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Role {
+    /// One output that is a function of the inputs, in the order of [`Candidate::inputs`].
+    Gate(TruthTable),
+    /// A flip-flop whose next state is its data, once some inputs are tied to a level.
+    FlipFlop(FlipFlop),
+}
+
+/// What a cell of the library does, for netlists that are mapped to it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CellFunction {
+    pub inputs: Vec<String>,
+    pub outputs: Vec<String>,
+    pub role: Role,
+}
+
+/// A cell that may be chosen.
+pub(super) struct Candidate<'g, 't> {
+    pub group: &'g Group<'t>,
+    /// Which of the library's files it is in.
+    pub file: usize,
+    /// Whether the library says not to use it.
+    pub dont_use: bool,
+    pub area: f64,
+    pub inputs: Vec<&'t str>,
+    pub outputs: Vec<&'t str>,
+    pub role: Role,
+}
+
+impl<'g, 't> Candidate<'g, 't> {
+    /// The cell of a library's file, if it is a gate or flip-flop of the kinds used here; [`super::passed_over`] says why another is not.
+    ///
+    /// # Errors
+    /// An area that is not a number, and words that mean nothing.
+    pub(super) fn of(group: &'g Group<'t>, file: usize) -> Result<Option<Self>, LibertyError> {
+        let area = group.number("area")?.unwrap_or(0.0);
+        let pins = || group.pins();
+        let of_direction = |direction: &str| {
+            let of = pins().filter(|(_, pin)| pin.value("direction") == Some(direction));
+            of.map(|(name, _)| name).collect::<Vec<_>>()
+        };
+        let (mut inputs, outputs) = (of_direction("input"), of_direction("output"));
+        // In one order in every drive of a family, whatever the file's is.
+        inputs.sort_unstable();
+        for pin in group.of_kind("pin") {
+            complete::check_word(pin, "direction", &["input", "output", "inout", "internal"])?;
+        }
+        complete::check_word(group, "dont_use", &["true", "false"])?;
+        let shared = pins().any(|(_, pin)| pin.value("three_state").is_some());
+        let names: BTreeSet<&str> = pins().map(|(name, _)| name).collect();
+        let is_named = group.of_kind("pin").all(|pin| !pin.arguments.is_empty());
+        let unclear = !is_named || names.len() < pins().count() || group.of_kind("ff").count() > 1;
+        let kinds = [
+            "latch",
+            "statetable",
+            "ff_bank",
+            "latch_bank",
+            "bus",
+            "bundle",
+        ];
+        let other = group.groups.iter().any(|g| kinds.contains(&g.kind));
+        let whole = inputs.len() + outputs.len() == pins().count();
+        if shared || unclear || other || !whole || outputs.is_empty() {
+            return Ok(None);
+        }
+        let role = match group.of_kind("ff").next() {
+            Some(ff) => FlipFlop::read(group, ff, &inputs, &outputs)?.map(Role::FlipFlop),
+            None if outputs.len() == 1 && (1..=TruthTable::MOST).contains(&inputs.len()) => {
+                let output = group.pin(outputs[0]);
+                let function = output.and_then(|pin| pin.value("function"));
+                function
+                    .and_then(|text| truth_table(text, &inputs))
+                    .map(Role::Gate)
+            }
+            None => None,
+        };
+        Ok(role.map(|role| Candidate {
+            group,
+            file,
+            dont_use: group.value("dont_use") == Some("true"),
+            area,
+            inputs,
+            outputs,
+            role,
+        }))
+    }
+
+    /// The cell's name.
+    pub(super) fn name(&self) -> &'t str {
+        self.group.name()
+    }
+
+    /// Its inputs and outputs: drives of one family have the same.
+    pub(super) fn pins(&self) -> (&[&'t str], &[&'t str]) {
+        (&self.inputs, &self.outputs)
+    }
+
+    /// What it does.
+    pub(super) fn function(&self) -> CellFunction {
+        let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        CellFunction {
+            inputs: owned(&self.inputs),
+            outputs: owned(&self.outputs),
+            role: self.role.clone(),
+        }
+    }
+}
+
+/// An input pin.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct InputPin {
+    pub name: String,
+    /// Capacitance while it rises and falls, fF.
+    pub load_ff: [f64; 2],
+}
+
+/// An output pin.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct OutputPin {
+    pub name: String,
+    /// Its own capacitance while it rises and falls, which loads it besides its net, fF.
+    pub load_ff: [f64; 2],
+}
+
+/// How an edge of an input makes one of an output.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellArc {
+    pub from: usize,
+    pub to: usize,
+    pub cause: Edge,
+    pub effect: Edge,
+    pub delay: Table,
+    pub slew: Table,
+}
+
+/// A limit on a flip-flop's pins.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellCheck {
+    pub kind: CheckKind,
+    pub pin: usize,
+    /// Direction of the pin that is bound.
+    pub edge: Edge,
+    /// Over the slews of clock and pin; of the pin alone for a pulse's width.
+    pub limit: Table,
+}
+
+/// Energy within a cell when a pin changes, besides that of the loads at its outputs.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellEnergy {
+    /// Output; none where an input takes it by itself.
+    pub to: Option<usize>,
+    /// The input that changes, or is behind the output's change; any where the file does not say.
+    pub from: Option<usize>,
+    /// Of the pin's rise and fall, fJ over the input's slew and the output's load.
+    pub of: [Table; 2],
+}
+
+/// A chosen cell with its tables.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellModel {
+    pub name: String,
+    /// Where it stands: the file's name, if there is one, and the line.
+    pub place: String,
+    pub role: Role,
+    pub area: f64,
+    /// Leakage, W.
+    pub leakage_w: f64,
+    pub inputs: Vec<InputPin>,
+    pub outputs: Vec<OutputPin>,
+    pub arcs: Vec<CellArc>,
+    pub checks: Vec<CellCheck>,
+    pub energies: Vec<CellEnergy>,
+    /// What it does not state, and what it states that is not used here.
+    pub remarks: Vec<Remark>,
+}
+
+impl CellModel {
+    /// Reads a candidate's tables.
+    ///
+    /// # Errors
+    /// Tables and numbers that are malformed, negative or beyond what delays are kept in, pins without capacitance, edges of a gate
+    /// without an arc, and names that Verilog cannot have.
+    pub(super) fn read(
+        candidate: &Candidate<'_, '_>,
+        file: &LibraryFile<'_, '_>,
+    ) -> Result<Self, LibertyError> {
+        let units = file.units;
+        let group = candidate.group;
+        let pin = |name: &str| group.pin(name).expect("a candidate's pin");
+        let fault = |line: usize, message: String| LibertyError { line, message };
+        complete::check_area_and_names(candidate)?;
+        let load = |name: &str, missing: Option<f64>| {
+            let loads = complete::capacitance(name, pin(name), missing)?;
+            Ok(loads.map(|load| load * units.load_ff))
+        };
+        let leakage = leakage_of(group, file.group)?;
+        let mut model = CellModel {
+            name: candidate.name().to_owned(),
+            place: file.place(group.line),
+            role: candidate.role.clone(),
+            area: candidate.area,
+            leakage_w: leakage.unwrap_or(0.0) * units.leakage_w,
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            arcs: Vec::new(),
+            checks: Vec::new(),
+            energies: Vec::new(),
+            remarks: Vec::new(),
+        };
+        let unstated = [
+            (group.value("area").is_none(), Remark::NoArea),
+            (leakage.is_none(), Remark::NoLeakage),
+        ];
+        let unstated = unstated.into_iter().filter(|(is_missing, _)| *is_missing);
+        model.remarks.extend(unstated.map(|(_, remark)| remark));
+        // A default of 0, which many files have, states nothing.
+        let default = |name| Ok(file.group.number(name)?.filter(|&default| default > 0.0));
+        let of_inputs = default("default_input_pin_cap")?;
+        let of_outputs = default("default_output_pin_cap")?.or(Some(0.0));
+        for (index, &name) in candidate.inputs.iter().enumerate() {
+            let group = pin(name);
+            let load_ff = load(name, of_inputs)?;
+            let name = name.to_owned();
+            model.inputs.push(InputPin { name, load_ff });
+            if group.value("min_period").is_some() {
+                model.remark(Remark::Period);
+            }
+            for (attribute, kind, edge) in [
+                ("min_pulse_width_high", PulseWidth::High, Edge::Rise),
+                ("min_pulse_width_low", PulseWidth::Low, Edge::Fall),
+            ] {
+                if let Some(width) = group.number(attribute)? {
+                    let limit = Table::fixed(width * units.time_fs);
+                    limit.check_range(group.line, attribute)?;
+                    model.add_width(candidate, index, kind, edge, limit);
+                }
+            }
+            for timing in group.of_kind("timing") {
+                model.add_checks(candidate, index, timing, file)?;
+            }
+            for power in group.of_kind("internal_power") {
+                model.add_energy((None, Some(index)), power, file);
+            }
+        }
+        for (index, &name) in candidate.outputs.iter().enumerate() {
+            let load_ff = load(name, of_outputs)?;
+            let output = name.to_owned();
+            model.outputs.push(OutputPin {
+                name: output,
+                load_ff,
+            });
+            for timing in pin(name).of_kind("timing") {
+                model.add_arcs(candidate, index, timing, file)?;
+            }
+            for power in pin(name).of_kind("internal_power") {
+                let related = power.value("related_pin").unwrap_or_default();
+                let from = |name| candidate.inputs.iter().position(|input| *input == name);
+                let from = related.split_whitespace().next().and_then(from);
+                model.add_energy((Some(index), from), power, file);
+            }
+        }
+        if model.energies.is_empty() {
+            model.remark(Remark::NoEnergy);
+        }
+        match model.role {
+            Role::Gate(function) => complete::check_gate(&model, function)
+                .map_err(|message| fault(group.line, message))?,
+            Role::FlipFlop(_) => {
+                let missing = complete::missing_limits(&model);
+                if !missing.is_empty() {
+                    model.remark(Remark::NoLimits(missing));
+                }
+            }
+        }
+        Ok(model)
+    }
+
+    fn remark(&mut self, remark: Remark) {
+        if !self.remarks.contains(&remark) {
+            self.remarks.push(remark);
+        }
+    }
+
+    /// Tables over anything but slews and loads are passed over, with a remark.
+    fn add_energy(
+        &mut self,
+        (to, from): (Option<usize>, Option<usize>),
+        power: &Group<'_>,
+        file: &LibraryFile<'_, '_>,
+    ) {
+        let table = |kind: &str| {
+            let mut groups = power.of_kind(kind).chain(power.of_kind("power"));
+            let read = |group| {
+                let unit = file.units.energy_fj;
+                file.templates.table_in(group, file.units, unit)
+            };
+            groups.next().map_or(Ok(Table::fixed(0.0)), read)
+        };
+        if let (Ok(rise), Ok(fall)) = (table("rise_power"), table("fall_power")) {
+            let of = [rise, fall];
+            self.energies.push(CellEnergy { to, from, of });
+        } else {
+            self.remark(Remark::Energy);
+        }
+    }
+
+    fn add_arcs(
+        &mut self,
+        candidate: &Candidate<'_, '_>,
+        to: usize,
+        timing: &Group<'_>,
+        file: &LibraryFile<'_, '_>,
+    ) -> Result<(), LibertyError> {
+        use Edge::{Fall, Rise};
+        let kind = complete::timing_type(timing)?;
+        let sense = complete::timing_sense(timing)?;
+        let delays = [
+            "combinational",
+            "combinational_rise",
+            "combinational_fall",
+            "rising_edge",
+            "falling_edge",
+            "clear",
+            "preset",
+        ];
+        if !delays.contains(&kind) {
+            return Ok(());
+        }
+        let related = timing.value("related_pin").unwrap_or_default();
+        for name in related.split_whitespace() {
+            let Some(from) = candidate.inputs.iter().position(|input| *input == name) else {
+                continue;
+            };
+            let sense = match (sense, &candidate.role) {
+                (None, Role::Gate(function)) => match function.unate(from as u32) {
+                    (true, false) => Some("positive_unate"),
+                    (false, true) => Some("negative_unate"),
+                    _ => None,
+                },
+                (sense, _) => sense,
+            };
+            let causes = |effect: Edge| -> &[Edge] {
+                match (kind, sense, effect) {
+                    ("rising_edge", ..) => &[Rise],
+                    ("falling_edge", ..) => &[Fall],
+                    ("combinational_rise", _, Fall) | ("combinational_fall", _, Rise) => &[],
+                    (_, Some("positive_unate"), Rise) | (_, Some("negative_unate"), Fall) => {
+                        &[Rise]
+                    }
+                    (_, Some("positive_unate"), Fall) | (_, Some("negative_unate"), Rise) => {
+                        &[Fall]
+                    }
+                    _ => &Edge::BOTH,
+                }
+            };
+            let tables = [
+                (Rise, "cell_rise", "rise_transition"),
+                (Fall, "cell_fall", "fall_transition"),
+            ];
+            for (effect, delay, slew) in tables {
+                let one = |kind| timing.of_kind(kind).next();
+                let (Some(delay), Some(slew)) = (one(delay), one(slew)) else {
+                    continue;
+                };
+                for &cause in causes(effect) {
+                    self.arcs.push(CellArc {
+                        from,
+                        to,
+                        cause,
+                        effect,
+                        delay: file.templates.table(delay, file.units)?,
+                        slew: file.templates.table(slew, file.units)?,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn add_checks(
+        &mut self,
+        candidate: &Candidate<'_, '_>,
+        pin: usize,
+        timing: &Group<'_>,
+        file: &LibraryFile<'_, '_>,
+    ) -> Result<(), LibertyError> {
+        let kind = match complete::timing_type(timing)? {
+            "setup_rising" | "setup_falling" => CheckKind::Setup,
+            "hold_rising" | "hold_falling" => CheckKind::Hold,
+            "recovery_rising" | "recovery_falling" => CheckKind::Recovery,
+            "removal_rising" | "removal_falling" => CheckKind::Removal,
+            "min_pulse_width" => {
+                for (table, kind, edge) in [
+                    ("rise_constraint", PulseWidth::High, Edge::Rise),
+                    ("fall_constraint", PulseWidth::Low, Edge::Fall),
+                ] {
+                    if let Some(group) = timing.of_kind(table).next() {
+                        let limit = file.templates.table(group, file.units)?;
+                        self.add_width(candidate, pin, kind, edge, limit);
+                    }
+                }
+                return Ok(());
+            }
+            "minimum_period" => {
+                self.remark(Remark::Period);
+                return Ok(());
+            }
+            _ => return Ok(()),
+        };
+        // Some libraries also relate clear and preset to each other.
+        let related = timing.value("related_pin").unwrap_or_default();
+        let is_clock = |roles: &FlipFlop| candidate.inputs[roles.clock.0] == related.trim();
+        if !matches!(&candidate.role, Role::FlipFlop(roles) if is_clock(roles)) {
+            return Ok(());
+        }
+        for (edge, table) in [
+            (Edge::Rise, "rise_constraint"),
+            (Edge::Fall, "fall_constraint"),
+        ] {
+            if let Some(group) = timing.of_kind(table).next() {
+                self.checks.push(CellCheck {
+                    kind,
+                    pin,
+                    edge,
+                    limit: file.templates.table(group, file.units)?,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// A pulse's width is a limit of the clock's or a control's, by what the pin is and when it is active.
+    fn add_width(
+        &mut self,
+        candidate: &Candidate<'_, '_>,
+        pin: usize,
+        width: PulseWidth,
+        edge: Edge,
+        limit: Table,
+    ) {
+        let Role::FlipFlop(roles) = &candidate.role else {
+            return;
+        };
+        let high = (width == PulseWidth::High) != (roles.clock.0 == pin && roles.clock.1);
+        let kind = if roles.clock.0 == pin {
+            if high {
+                CheckKind::ClockHigh
+            } else {
+                CheckKind::ClockLow
+            }
+        } else {
+            let control = [roles.clear, roles.preset]
+                .into_iter()
+                .flatten()
+                .find(|c| c.0 == pin);
+            match control {
+                Some((_, active_low)) if active_low == (width == PulseWidth::Low) => {
+                    CheckKind::ControlHigh
+                }
+                _ => return,
+            }
+        };
+        self.checks.push(CellCheck {
+            kind,
+            pin,
+            edge,
+            limit,
+        });
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum PulseWidth {
+    High,
+    Low,
+}

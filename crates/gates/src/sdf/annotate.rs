@@ -1,0 +1,389 @@
+//! The delays and limits of a file put into a design.
+
+use std::collections::HashMap;
+
+use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
+use crate::InputError;
+use crate::netlist::{ArcDelay, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing};
+
+/// What an annotation did.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Annotation {
+    /// Arcs (input and output pin of a cell, both directions) that got a delay from IOPATH or DEVICE.
+    pub arcs: usize,
+    /// Input pins that a wire delay was added to.
+    pub wires: usize,
+    /// Timing checks of single instances whose limits were taken over.
+    pub checks: usize,
+    /// Delays and limits that could not be taken over as they are.
+    pub notes: Vec<Skipped>,
+    /// Longest wire delay left out because it ends at a flip-flop's D, fs.
+    pub longest_wire_to_d_fs: i64,
+}
+
+impl Annotation {
+    /// Whether nothing of the file was taken over.
+    pub fn is_empty(&self) -> bool {
+        self.arcs + self.wires + self.checks == 0
+    }
+}
+
+const LONGEST_ARC: &str = "arcs with several delays, of which the longest is used";
+
+/// Puts delays and limits of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of
+/// them. Wires of an earlier annotation count as part of the arcs.
+///
+/// # Errors
+/// Unknown instances, cell types and pins, wires between pins that are not connected, and sums that are
+/// negative or beyond 4.29 µs: line, reason and cure. `timing` is then only partly annotated.
+pub fn annotate(
+    timing: &mut Timing,
+    netlist: &Netlist,
+    sdf: &Sdf<'_>,
+    corner: Corner,
+) -> Result<Annotation, InputError> {
+    let mut annotator = Annotator {
+        netlist,
+        of_kind: cells_by_kind(netlist),
+        sdf,
+        corner,
+        wires: HashMap::new(),
+        stages: Stages::new(),
+        result: Annotation::default(),
+    };
+    for cell in &sdf.cells {
+        annotator.cell(timing, cell)?;
+    }
+    annotator.add_stages(timing)?;
+    annotator.add_wires(timing)?;
+    Ok(annotator.result)
+}
+
+fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<usize>> {
+    let mut cells: HashMap<CellKind, Vec<usize>> = HashMap::new();
+    for (index, cell) in netlist.cells().iter().enumerate() {
+        cells.entry(cell.kind).or_default().push(index);
+    }
+    cells
+}
+
+/// Delays of one arc by output, by edge of the input, by direction of the output, as far as given.
+type ArcSlots = [[[Option<i64>; 2]; 2]; 2];
+
+/// Delays of the stages (rise, fall, fs) by cell, and the line of the last of them.
+pub(super) type Stages = HashMap<usize, (Vec<[i64; 2]>, usize)>;
+
+/// The wire to one input pin.
+pub(super) struct Wire {
+    pub(super) line: usize,
+    pub(super) rise_fs: i64,
+    pub(super) fall_fs: i64,
+}
+
+pub(super) struct Annotator<'n, 's, 'a> {
+    pub(super) netlist: &'n Netlist,
+    of_kind: HashMap<CellKind, Vec<usize>>,
+    sdf: &'s Sdf<'a>,
+    pub(super) corner: Corner,
+    pub(super) wires: HashMap<(usize, usize), Wire>,
+    pub(super) stages: Stages,
+    pub(super) result: Annotation,
+}
+
+impl Annotator<'_, '_, '_> {
+    pub(super) fn error<T>(
+        &self,
+        line: usize,
+        message: impl Into<String>,
+    ) -> Result<T, InputError> {
+        Err(InputError::at(&self.sdf.source, line, message))
+    }
+
+    pub(super) fn note(&mut self, what: &'static str, line: usize) {
+        Skipped::count(&mut self.result.notes, what, line);
+    }
+
+    fn cell(&mut self, timing: &mut Timing, entry: &SdfCell<'_>) -> Result<(), InputError> {
+        let kind = CellKind::ALL
+            .into_iter()
+            .find(|k| k.name() == entry.cell_type);
+        match (&entry.instance, kind) {
+            (SdfInstance::Every, None) => self.error(
+                entry.line,
+                format!(
+                    "the library has no cell {}; correct CELLTYPE",
+                    entry.cell_type
+                ),
+            ),
+            (SdfInstance::Every, Some(kind)) => {
+                let cells = self.of_kind.get(&kind).cloned();
+                for cell in cells.unwrap_or_default() {
+                    self.leaf(timing, entry, cell)?;
+                }
+                Ok(())
+            }
+            (SdfInstance::Path(path), _) => {
+                let (name, wanted) = if let Some(cell) = self.netlist.cell(path) {
+                    let name = self.netlist.cells()[cell].kind.name();
+                    if name == entry.cell_type {
+                        return self.leaf(timing, entry, cell);
+                    }
+                    (path.as_ref(), name)
+                } else if let Some(stage) = Chain::find(self.netlist, path) {
+                    return self.stage(timing, entry, stage);
+                } else if let Some(scope) = self.netlist.scope(path) {
+                    let name = self.netlist.scopes()[scope].module.name();
+                    if name == entry.cell_type {
+                        return self.module(entry, path);
+                    }
+                    (if path.is_empty() { "the top" } else { path }, name)
+                } else {
+                    return self.error(
+                        entry.line,
+                        match self.elsewhere(path) {
+                            Some(meant) => format!(
+                                "the chip has no instance {path}, but has {meant}; give paths below its top and the right DIVIDER"
+                            ),
+                            None => format!(
+                                "the chip has no instance {path}; give a path below its top and the right DIVIDER, and an array with as many rows and columns"
+                            ),
+                        },
+                    );
+                };
+                self.error(
+                    entry.line,
+                    format!(
+                        "{name} is a {wanted} and no {}; correct CELLTYPE or INSTANCE",
+                        entry.cell_type
+                    ),
+                )
+            }
+        }
+    }
+
+    /// The instance that a path may mean: with the other divider, or below a testbench.
+    fn elsewhere(&self, path: &str) -> Option<String> {
+        let dotted = path.replace("\\.", ".").replace('/', ".");
+        let mut rest = Some(dotted.as_str());
+        let mut below = std::iter::from_fn(|| {
+            let path = rest?;
+            rest = path.split_once('.').map(|(_, below)| below);
+            Some(path)
+        });
+        let is_there = |path: &&str| {
+            let [cell, scope] = [self.netlist.cell(path), self.netlist.scope(path)];
+            !path.is_empty() && (cell.is_some() || scope.is_some())
+        };
+        below.find(is_there).map(str::to_owned)
+    }
+
+    fn module(&mut self, entry: &SdfCell<'_>, path: &str) -> Result<(), InputError> {
+        for delay in &entry.delays {
+            match &delay.path {
+                DelayPath::Interconnect(from, to) => self.interconnect(path, delay, from, to)?,
+                _ => {
+                    let message = format!(
+                        "{} is a module, which has no delays but INTERCONNECT; name one of its cells",
+                        entry.cell_type
+                    );
+                    return self.error(delay.line, message);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn leaf(
+        &mut self,
+        timing: &mut Timing,
+        entry: &SdfCell<'_>,
+        cell: usize,
+    ) -> Result<(), InputError> {
+        self.limits(timing, entry, cell)?;
+        let kind = self.netlist.cells()[cell].kind;
+        let mut slots: [ArcSlots; MAX_INPUTS] = Default::default();
+        let mut last_line = [entry.line; MAX_INPUTS];
+        for delay in &entry.delays {
+            match &delay.path {
+                DelayPath::IoPath(from, to) => {
+                    let pin = self.input(kind, &from.pin, delay.line)?;
+                    self.check_arc(kind, pin, from, delay.line)?;
+                    let output = self.output(kind, to, delay.line)?;
+                    last_line[pin] = delay.line;
+                    let before = timing.of(cell)[pin][output];
+                    self.fill(before, &mut slots[pin][output], from.edge, delay);
+                }
+                DelayPath::Device(to) => {
+                    let outputs = match to {
+                        None => 0..kind.outputs().len(),
+                        Some(to) => {
+                            let output = self.output(kind, to, delay.line)?;
+                            output..output + 1
+                        }
+                    };
+                    for pin in (0..kind.inputs().len()).filter(|&p| kind.triggers(p)) {
+                        last_line[pin] = delay.line;
+                        for output in outputs.clone() {
+                            let before = timing.of(cell)[pin][output];
+                            self.fill(before, &mut slots[pin][output], None, delay);
+                        }
+                    }
+                }
+                DelayPath::Port(to) => {
+                    let pin = self.input(kind, to, delay.line)?;
+                    self.wire(cell, pin, delay);
+                }
+                DelayPath::Interconnect(..) => {
+                    let message = "a cell has no wires inside; move INTERCONNECT to the CELL of its module or of the top";
+                    return self.error(delay.line, message);
+                }
+            }
+        }
+        let mut delays = *timing.of(cell);
+        let mut changed = false;
+        let outputs = kind.outputs().len();
+        for (pin, output) in (0..kind.inputs().len() * outputs).map(|n| (n / outputs, n % outputs))
+        {
+            let arc = &mut delays[pin][output];
+            let mut ambiguous = false;
+            let mut given = false;
+            for (direction, delay) in [&mut arc.rise_fs, &mut arc.fall_fs].into_iter().enumerate() {
+                let all = || {
+                    (slots[pin][output].iter().zip(Edge::BOTH))
+                        .filter(|(_, edge)| causes(kind, pin, *edge, direction == 0))
+                        .filter_map(|(slot, _)| slot[direction])
+                };
+                let Some(longest) = all().max() else { continue };
+                ambiguous |= all().any(|d| d != longest);
+                given = true;
+                let Ok(fs) = u32::try_from(longest) else {
+                    return self.out_of_range(last_line[pin], longest);
+                };
+                *delay = fs;
+            }
+            self.result.arcs += given as usize;
+            changed |= given;
+            if ambiguous {
+                self.note(LONGEST_ARC, last_line[pin]);
+            }
+        }
+        if changed && delays != *timing.of(cell) {
+            timing.set(cell, delays);
+        }
+        Ok(())
+    }
+
+    /// Enters one delay for the edges it is about.
+    fn fill(
+        &self,
+        before: ArcDelay,
+        slots: &mut [[Option<i64>; 2]; 2],
+        edge: Option<Edge>,
+        delay: &SdfDelay<'_>,
+    ) {
+        let values = [(delay.rise, before.rise_fs), (delay.fall, before.fall_fs)];
+        for (of_edge, slot) in Edge::BOTH.into_iter().zip(slots) {
+            if edge.is_some_and(|e| e != of_edge) {
+                continue;
+            }
+            for (slot, (value, before)) in slot.iter_mut().zip(values) {
+                if let Some(fs) = value.at(self.corner) {
+                    *slot = Some(if delay.increment {
+                        slot.unwrap_or(before as i64) + fs
+                    } else {
+                        fs
+                    });
+                }
+            }
+        }
+    }
+
+    pub(super) fn input(
+        &self,
+        kind: CellKind,
+        name: &str,
+        line: usize,
+    ) -> Result<usize, InputError> {
+        self.pin(kind, kind.inputs(), "input", name, line)
+    }
+
+    pub(super) fn output(
+        &self,
+        kind: CellKind,
+        name: &str,
+        line: usize,
+    ) -> Result<usize, InputError> {
+        self.pin(kind, kind.outputs(), "output", name, line)
+    }
+
+    fn pin(
+        &self,
+        kind: CellKind,
+        pins: &[&str],
+        side: &str,
+        name: &str,
+        line: usize,
+    ) -> Result<usize, InputError> {
+        match pins.iter().position(|p| *p == name) {
+            Some(pin) => Ok(pin),
+            None => self.error(
+                line,
+                format!(
+                    "{} has no {side} pin {name}; give {}",
+                    kind.name(),
+                    pins.join(" or ")
+                ),
+            ),
+        }
+    }
+
+    /// Refuses arcs of which neither edge does anything.
+    fn check_arc(
+        &self,
+        kind: CellKind,
+        pin: usize,
+        from: &PinEdge<'_>,
+        line: usize,
+    ) -> Result<(), InputError> {
+        let edges = match from.edge {
+            Some(edge) => vec![edge],
+            None => Edge::BOTH.to_vec(),
+        };
+        let does_something =
+            |&edge: &Edge| causes(kind, pin, edge, true) || causes(kind, pin, edge, false);
+        if edges.iter().any(does_something) {
+            return Ok(());
+        }
+        let message = match from.edge {
+            None => format!("{} of {} changes no output", from.pin, kind.name()),
+            Some(_) => format!(
+                "this edge of {} of {} changes no output",
+                from.pin,
+                kind.name()
+            ),
+        };
+        self.error(line, message + "; remove this IOPATH")
+    }
+
+    pub(super) fn out_of_range<T>(&self, line: usize, fs: i64) -> Result<T, InputError> {
+        let message =
+            format!("the delay becomes {fs} fs; keep what is added up between 0 and 4.29 µs");
+        self.error(line, message)
+    }
+}
+
+/// Whether the delay to a rising (or falling) output of the cell matters to an edge of an input pin. A flip-flop's
+/// outputs may become unknown with any of its edges, after the shorter of both delays.
+pub(super) fn causes(kind: CellKind, pin: usize, edge: Edge, output_rises: bool) -> bool {
+    let rises = edge == Edge::Rise;
+    match (kind, pin) {
+        (CellKind::Inv | CellKind::Nand2 | CellKind::Nor2, _) => rises != output_rises,
+        (CellKind::Buf | CellKind::And2 | CellKind::Or2, _) => rises == output_rises,
+        (CellKind::Mux2, 0 | 1) => rises == output_rises,
+        (CellKind::Xor2 | CellKind::Xnor2 | CellKind::Mux2, _) => true,
+        (CellKind::Dffr | CellKind::Dffsr, 0) => false,
+        // Releasing the reset does something only where a set is still waiting.
+        (CellKind::Dffsr, 2) => true,
+        (CellKind::Dffr | CellKind::Dffsr, _) => rises,
+    }
+}

@@ -1,0 +1,134 @@
+//! Wire delays: where INTERCONNECT and PORT end, and how they are added to the arcs of that pin.
+
+use super::annotate::{Annotator, Wire, causes};
+use super::{SdfDelay, join};
+use crate::InputError;
+use crate::netlist::{Direction, Edge, NetId, Timing};
+
+const WIRE_TO_D: &str = "wires to D of a flip-flop";
+const WIRE_TO_OUTPUT: &str = "wires to outputs of the chip";
+const UNEQUAL_WIRE: &str = "wires that rise and fall differently into a non-unate arc";
+
+impl Annotator<'_, '_, '_> {
+    pub(super) fn interconnect(
+        &mut self,
+        scope: &str,
+        delay: &SdfDelay<'_>,
+        from: &str,
+        to: &str,
+    ) -> Result<(), InputError> {
+        let source = self.net_of(scope, from, delay.line, Direction::Input)?;
+        let target = join(scope, to);
+        if let Some((instance, name)) = target.rsplit_once('.')
+            && let Some(cell) = self.netlist.cell(instance)
+        {
+            let flat = self.netlist.cells()[cell];
+            let pin = self.input(flat.kind, name, delay.line)?;
+            if source.is_none() || flat.inputs[pin] != source {
+                let message = format!("{from} and {to} are not connected; correct one of the two");
+                return self.error(delay.line, message);
+            }
+            self.wire(cell, pin, delay);
+            return Ok(());
+        }
+        self.net_of(scope, to, delay.line, Direction::Output)?;
+        self.note(WIRE_TO_OUTPUT, delay.line);
+        Ok(())
+    }
+
+    /// The net of a cell's output pin, or of a port of the top with this direction.
+    fn net_of(
+        &self,
+        scope: &str,
+        path: &str,
+        line: usize,
+        port: Direction,
+    ) -> Result<Option<NetId>, InputError> {
+        let full = join(scope, path);
+        if let Some((instance, name)) = full.rsplit_once('.')
+            && let Some(cell) = self.netlist.cell(instance)
+        {
+            let flat = self.netlist.cells()[cell];
+            let output = self.output(flat.kind, name, line)?;
+            return Ok(flat.outputs[output]);
+        }
+        let signal = full.split('[').next().unwrap_or("");
+        let top = &self.netlist.scopes()[0].module;
+        let is_port = top
+            .port_signals()
+            .any(|(direction, s)| direction == port && s.name == signal);
+        match self.netlist.net(&full) {
+            Some(net) if is_port => Ok(Some(net)),
+            _ => self.error(
+                line,
+                format!(
+                    "{path} is neither a pin of a cell nor a port of the chip that a wire could have here; correct it"
+                ),
+            ),
+        }
+    }
+
+    pub(super) fn wire(&mut self, cell: usize, pin: usize, delay: &SdfDelay<'_>) {
+        let kind = self.netlist.cells()[cell].kind;
+        let values = [delay.rise, delay.fall].map(|triple| triple.at(self.corner));
+        if !kind.triggers(pin) {
+            let longest = values.into_iter().flatten().max().unwrap_or(0);
+            self.result.longest_wire_to_d_fs = self.result.longest_wire_to_d_fs.max(longest);
+            self.note(WIRE_TO_D, delay.line);
+            return;
+        }
+        if values == [None; 2] {
+            return;
+        }
+        let wire = self.wires.entry((cell, pin)).or_insert(Wire {
+            line: delay.line,
+            rise_fs: 0,
+            fall_fs: 0,
+        });
+        wire.line = delay.line;
+        for (member, value) in [&mut wire.rise_fs, &mut wire.fall_fs]
+            .into_iter()
+            .zip(values)
+        {
+            if let Some(fs) = value {
+                *member = fs + if delay.increment { *member } else { 0 };
+            }
+        }
+    }
+
+    pub(super) fn add_wires(&mut self, timing: &mut Timing) -> Result<(), InputError> {
+        let mut wires: Vec<_> = std::mem::take(&mut self.wires).into_iter().collect();
+        // In the order of the file, so that the first mistake is the one reported.
+        wires.sort_unstable_by_key(|((cell, pin), wire)| (wire.line, *cell, *pin));
+        for ((cell, pin), wire) in wires {
+            let kind = self.netlist.cells()[cell].kind;
+            let mut delays = *timing.of(cell);
+            let mut unequal = false;
+            let arcs = delays[pin][..kind.outputs().len()].iter_mut();
+            for (delay, rises) in
+                arcs.flat_map(|arc| [(&mut arc.rise_fs, true), (&mut arc.fall_fs, false)])
+            {
+                let by_edge = [(Edge::Rise, wire.rise_fs), (Edge::Fall, wire.fall_fs)];
+                let causes = by_edge
+                    .iter()
+                    .filter(|(edge, _)| causes(kind, pin, *edge, rises))
+                    .map(|(_, fs)| *fs);
+                let Some(longest) = causes.clone().max() else {
+                    continue;
+                };
+                unequal |= causes.clone().any(|fs| fs != longest);
+                let sum = *delay as i64 + longest;
+                let Ok(fs) = u32::try_from(sum) else {
+                    return self.out_of_range(wire.line, sum);
+                };
+                *delay = fs;
+            }
+            if unequal {
+                self.note(UNEQUAL_WIRE, wire.line);
+            }
+            self.result.wires += 1;
+            timing.set(cell, delays);
+        }
+        Ok(())
+    }
+}
