@@ -125,7 +125,7 @@ impl SpadModel {
         }
     }
 
-    /// How long SPAD number `spad` of macropixel number `pixel` stays blind: a Gaussian number, cut off at [`SPREAD_REACH`] standard
+    /// How long SPAD number `spad` of macropixel number `pixel` stays blind: a Gaussian number, cut off at four standard
     /// deviations.
     pub fn dead_time_of(&self, pixel: u32, spad: u8) -> Time {
         if self.dead_time_spread == 0.0 {
