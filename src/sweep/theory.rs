@@ -418,7 +418,7 @@ mod tests {
             range_m: 150.0,
             reflectivity: 0.1,
             illuminance_klux: Some(50.0),
-            laser_cycles: 100,
+            laser_cycles: 15,
             ..Asked::default()
         };
         let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
