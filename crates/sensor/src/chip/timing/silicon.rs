@@ -151,7 +151,9 @@ mod tests {
             let mut lines = code
                 .lines()
                 .filter(|line| !line.trim_start().starts_with("//"));
-            if !path.ends_with("tests.rs") && lines.any(|line| line.contains("Library::generic_40nm")) {
+            if !path.ends_with("tests.rs")
+                && lines.any(|line| line.contains("Library::generic_40nm"))
+            {
                 found.push(path.display().to_string());
             }
         }
