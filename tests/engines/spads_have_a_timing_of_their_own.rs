@@ -29,10 +29,10 @@ struct Bench {
 
 impl Bench {
     fn new(lidar: &str, laser_cycles: u32, seed: u64) -> Self {
-        Self::of(SensorConfig::default(), lidar, laser_cycles, seed)
+        Self::with_config(SensorConfig::default(), lidar, laser_cycles, seed)
     }
 
-    fn of(config: SensorConfig, lidar: &str, laser_cycles: u32, seed: u64) -> Self {
+    fn with_config(config: SensorConfig, lidar: &str, laser_cycles: u32, seed: u64) -> Self {
         let config = SensorConfig {
             rows: 2,
             cols: 2,
@@ -114,7 +114,7 @@ fn unequal_dead_times_count_alike_or_are_refused() {
     // Of the sun's light and of an echo that blinds; drawn by laser cycle where it is strong.
     for pulse_energy_uj in [5e-4, 0.02] {
         let bench = |config: SensorConfig| {
-            let mut bench = Bench::of(config, "", 200, 3);
+            let mut bench = Bench::with_config(config, "", 200, 3);
             bench.scene.lidar.pulse_energy_uj = pulse_energy_uj;
             bench
         };

@@ -87,9 +87,8 @@ impl<'a> Avalanches<'a> {
         breeding: impl Iterator<Item = Photon>,
     ) -> Self {
         let mut avalanches = Self::in_the_dark(model, key, pixel, dead_times);
-        for spad in 0..avalanches.blind_until.len() {
-            let dead_time = avalanches.dead_time_of(spad);
-            avalanches.blind_until[spad] = time - Time::from_fs(1) + dead_time;
+        for (spad, until) in (0..).zip(&mut avalanches.blind_until) {
+            *until = time - Time::from_fs(1) + model.dead_time_among(dead_times, spad);
         }
         avalanches.unknown = u64::MAX;
         for photon in breeding {
@@ -102,9 +101,8 @@ impl<'a> Avalanches<'a> {
     }
 
     #[inline]
-    fn dead_time_of(&self, spad: usize) -> Time {
-        let own = self.dead_times.get(spad);
-        own.copied().unwrap_or(self.model.dead_time)
+    fn dead_time_of(&self, spad: u8) -> Time {
+        self.model.dead_time_among(self.dead_times, spad)
     }
 
     /// Runs all `photons`, sorted, and what they cause; appends the rising edges to `edges` and returns how many avalanches
@@ -192,14 +190,9 @@ impl<'a> Avalanches<'a> {
                 self.lost += 1;
             }
             if is_ready || is_paralysable {
-                let mut until = before.max(time + self.dead_time_of(spad.into()));
+                let mut until = before.max(time + self.dead_time_of(spad));
                 if let Some(echoes) = echoes {
-                    until = echoes.blind(
-                        spad,
-                        self.dead_time_of(spad.into()),
-                        before.max(time),
-                        until,
-                    );
+                    until = echoes.blind(spad, self.dead_time_of(spad), before.max(time), until);
                 }
                 self.blind_until[usize::from(spad)] = until;
             }
@@ -215,7 +208,7 @@ impl<'a> Avalanches<'a> {
         if time >= wanted_from || source == Source::Echo {
             return Err(Unknown);
         }
-        self.blind_until[usize::from(spad)] = before.max(time + self.dead_time_of(spad.into()));
+        self.blind_until[usize::from(spad)] = before.max(time + self.dead_time_of(spad));
         self.unknown |= 1 << spad;
         if breeds {
             self.breed(photon, false);
@@ -226,7 +219,7 @@ impl<'a> Avalanches<'a> {
     /// Notes what an avalanche causes.
     fn breed(&mut self, parent: Photon, is_certain: bool) {
         let parent = SpadEvent::new(parent.time, parent.spad);
-        let dead_time = self.dead_time_of(parent.spad.into());
+        let dead_time = self.dead_time_of(parent.spad);
         let children = self.model.children(self.key, self.pixel, dead_time, parent);
         self.pending
             .extend(children.map(|child| Reverse((child, is_certain))));

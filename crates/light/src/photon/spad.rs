@@ -38,7 +38,7 @@ pub const MOST_SPREAD: f64 = 0.2;
 /// Standard deviations at which dead times are cut off.
 const SPREAD_REACH: f64 = 4.0;
 
-/// Random numbers of dead times have SPAD numbers with this bit: no array of a macropixel has as many.
+/// Added to a SPAD's number for the random numbers of its dead time, which are no others then: a macropixel has at most 64 SPADs.
 const DEAD_TIMES: u32 = 1 << 8;
 
 /// How long after an avalanche crosstalk fires a neighbour.
@@ -146,6 +146,13 @@ impl SpadModel {
         spads.map(|spad| self.dead_time_of(pixel, spad)).collect()
     }
 
+    /// The dead time of a SPAD, where these are those of its macropixel.
+    #[inline]
+    pub(super) fn dead_time_among(&self, dead_times: &[Time], spad: u8) -> Time {
+        let own = dead_times.get(usize::from(spad));
+        own.copied().unwrap_or(self.dead_time)
+    }
+
     /// The dead time this many standard deviations above the mean.
     fn dead_time_at(&self, deviations: f64) -> Time {
         let factor = 1.0 + self.dead_time_spread * deviations;
@@ -187,8 +194,8 @@ impl SpadModel {
         reach
     }
 
-    /// The avalanches that the avalanche `parent` of macropixel `pixel` triggers, if it is one that does, on a SPAD with this dead time. `key` is
-    /// that of the photon stream.
+    /// The avalanches that the avalanche `parent` of macropixel `pixel` triggers, if it is one that does. `dead_time` is that of its SPAD, `key` that
+    /// of the photon stream.
     pub(super) fn children(
         &self,
         key: [u32; 2],

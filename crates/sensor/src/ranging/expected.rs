@@ -130,7 +130,7 @@ impl Response {
         Some(other)
     }
 
-    /// The same SPADs, blind for so many times as long.
+    /// The same SPADs with dead times that are `factor` times as long.
     pub(super) fn with_dead_times(mut self, factor: f64) -> Self {
         self.dead.time_bins *= factor;
         self

@@ -214,8 +214,7 @@ impl PixelStream<'_> {
     pub fn children(&self, photon: Photon) -> impl Iterator<Item = SpadEvent> {
         let parent = SpadEvent::new(photon.time, photon.spad);
         let spads = &self.stream.config.spads;
-        let own = self.dead_times.get(usize::from(photon.spad));
-        let dead_time = own.copied().unwrap_or(spads.dead_time);
+        let dead_time = spads.dead_time_among(&self.dead_times, photon.spad);
         spads.children(self.stream.key, self.pixel, dead_time, parent)
     }
 

@@ -228,11 +228,11 @@ proptest! {
         let steps = response.steps(&light, Steps::Fine);
         let [chosen, finer] = [steps, 6 * steps].map(|steps| response.chances_by::<0>(&light, steps));
         let worst = chosen.iter().zip(&finer).map(|(a, b)| (a.value - b.value).abs()).fold(0.0, f64::max);
-        // Of 3000 lights: 1.0·10⁻³ below 20 photons (later 2.3·10⁻³ of one with 13 in a fifth of a bin beside its end); above, 1.4·10⁻³ where a non-paralysable SPAD fires again under the
-        // pulse, 1.3·10⁻² where it fires once, 2.0·10⁻² where it
-        // is paralysable or would need more than the most steps.
+        // Of 3000 lights: 1.0·10⁻³ below 20 photons (of 400 000: 3.5·10⁻³, of a pulse of a fifth of a bin beside a bin's end);
+        // above, 1.4·10⁻³ where a non-paralysable SPAD fires again under the pulse, 1.3·10⁻² where it fires once, 2.0·10⁻²
+        // where it is paralysable or would need more than the most steps.
         let fires_again = steps > STEPS && steps < MOST_STEPS as usize && !paralysable;
-        let allowed = if light.signal < 20.0 || fires_again { 4e-3 } else { 4e-2 };
+        let allowed = if light.signal < 20.0 || fires_again { 6e-3 } else { 4e-2 };
         prop_assert!(worst < allowed, "{worst} with {steps} steps");
         prop_assert!(steps <= MOST_STEPS as usize && response.steps(&light, Steps::Coarse) <= steps);
     }
