@@ -27,7 +27,7 @@ pub(super) const CATEGORY_COLOURS: [Rgb; 8] = [
     [246, 146, 200],
     [190, 20, 60],
     [255, 120, 60],
-    [120, 40, 140],
+    [130, 70, 40],
 ];
 
 /// The colour at `position` of the scale, 0 (nearest) to 1 (farthest); clamped, NaN is nearest.
