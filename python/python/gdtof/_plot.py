@@ -29,7 +29,7 @@ DISTANCES = ("depth", "guide", "truth", "peak")
 NOTHING = "0.8"
 """Grey of macropixels without a value."""
 
-REASON_COLOURS = ["white", "#d9d9d9", "#80b1d3", "#bebada", "#666666", "#fb8072", "#fdb462", "#8dd3c7", "#b3de69"]
+REASON_COLOURS = ["white", "#d9d9d9", "#80b1d3", "#bebada", "#666666", "#fb8072", "#fdb462", "#8dd3c7", "#8b5a2b"]
 """One for each reason, that of a depth first; told apart by their brightness, too."""
 
 MOST_BY_DEFAULT = 8
