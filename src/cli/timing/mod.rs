@@ -15,7 +15,7 @@ use self::tables::Subject;
 use super::SensorArgs;
 use super::settings::SiliconArgs;
 use super::voice::{busy, say_json, tell};
-use crate::analysis::{LoadTiming, ReadTiming, TimingVerdict};
+use crate::analysis::{HighestClock, LoadTiming, ReadTiming, TimingVerdict, highest_clock};
 use crate::chip::{Limits, SensorConfig, Silicon, Tdc};
 use crate::files::InputError;
 
@@ -88,6 +88,7 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
         (tightest.row, tightest.col)
     });
     let verdict = TimingVerdict::of(&config, &silicon, position);
+    let highest = highest_clock(&config, &silicon, position);
     let mut sections = vec![
         condition_table(&args.silicon, &config, &silicon),
         tables::verdict(&verdict),
@@ -118,16 +119,52 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     if args.json {
         let mut document = serde_json::Map::new();
         document.insert("timing".to_owned(), serde_json::to_value(verdict.report())?);
+        document.insert("highest_clk".to_owned(), highest_report(highest.as_ref()));
         for section in &sections {
             section.add_to(&mut document);
         }
         say_json(&document)?;
     } else {
+        tell(answer(&config, &verdict, highest.as_ref()))?;
         for section in &sections {
             tell(section.text())?;
         }
     }
     Ok(())
+}
+
+/// The first line: whether the chip keeps its timing, how fast it may be clocked, and what limits it.
+fn answer(
+    config: &SensorConfig,
+    verdict: &TimingVerdict,
+    highest: Option<&HighestClock>,
+) -> String {
+    let own_mhz = config.clk_hz * 1e-6;
+    let kept = if verdict.is_met() { "keeps" } else { "breaks" };
+    let rest = match highest {
+        None => "at every CLK down to a sixteenth of it, too".to_owned(),
+        Some(HighestClock { clk_hz, limit }) => {
+            let up_to = format!("the highest CLK is {:.1} MHz", clk_hz * 1e-6);
+            match limit {
+                Some(limit) => format!("{up_to}, limited by {} ({})", limit.check, limit.path),
+                None => format!("{up_to} or more"),
+            }
+        }
+    };
+    format!("This chip {kept} its timing at {own_mhz} MHz; {rest}.\n")
+}
+
+/// The highest CLK as JSON: `null` where there is none.
+fn highest_report(highest: Option<&HighestClock>) -> serde_json::Value {
+    let report = |highest: &HighestClock| {
+        let limit = highest.limit.as_ref();
+        serde_json::json!({
+            "mhz": highest.clk_hz * 1e-6,
+            "check": limit.map(|limit| &limit.check),
+            "path": limit.map(|limit| &limit.path),
+        })
+    };
+    highest.map_or(serde_json::Value::Null, report)
 }
 
 fn condition_table(args: &SiliconArgs, config: &SensorConfig, silicon: &Silicon) -> Section {
