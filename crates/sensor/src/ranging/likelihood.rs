@@ -246,6 +246,10 @@ impl Likelihood<'_> {
         let mut step = solved(matrix, wanted)?;
         // No farther than the slopes can be trusted: half a bin or pulse, and factors of e.
         let most = [0.5 + 0.5 * self.response.pulse_sigma_bins, 1.0, 1.5, 0.5];
+        // Under a THRESHOLD bins say next to nothing of the background, which would hold back everything else.
+        if self.response.counting.threshold > 0 {
+            step[2] = step[2].clamp(-most[2], most[2]);
+        }
         let scale = step
             .iter()
             .zip(most)

@@ -28,7 +28,7 @@ use crate::chip::EventType;
 mod many_starts;
 
 /// Shares of the most background with which the best fit under a THRESHOLD is tried again: chosen. Of 495 random lights under a
-/// THRESHOLD six were fitted more than half a bound beside without, and one is with it.
+/// THRESHOLD six were fitted more than half a bound beside without, and one was when each was tried.
 const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 
 /// Deviance that a width of its own must save (Akaike).
@@ -354,7 +354,7 @@ impl WalkCorrection {
     }
 
     /// The best of a fit and of those with less background. Under a THRESHOLD bins without an echo say next to nothing of the background, and
-    /// fits stay where it is too much.
+    /// fits stay where it is too much. The best of some backgrounds is freed, if it is better; the others are rivals.
     fn darker(&self, likelihood: &Likelihood<'_>, best: Fit) -> Fit {
         if self.response.counting.threshold == 0 {
             return best;
@@ -363,16 +363,21 @@ impl WalkCorrection {
             free: IN_REGION,
             ..likelihood.clone()
         };
-        let mut fits = vec![best];
-        for share in DARKER {
-            let start = EchoLight {
-                background_per_bin: share * likelihood.most_background,
-                ..best.light
-            };
-            fits.push(likelihood.maximise(&held.near(&start).light));
-        }
+        let mut light = best.light;
+        let held = DARKER.map(|share| {
+            light.background_per_bin = share * likelihood.most_background;
+            let fit = held.maximise(&light);
+            light = fit.light;
+            fit
+        });
+        let least = held.iter().min_by(|a, b| a.deviance.total_cmp(&b.deviance));
+        let better = least.filter(|fit| fit.deviance < best.deviance);
+        let freed = better.map(|fit| likelihood.maximise(&fit.light));
+        let mut fits: Vec<Fit> = freed.into_iter().chain([best]).collect();
         fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
-        with_rivals(fits[0], &fits, likelihood)
+        let first = fits[0];
+        fits.extend(held);
+        with_rivals(first, &fits, likelihood)
     }
 
     /// The widest echo, whose ends are to be seen either side of it.

@@ -194,7 +194,8 @@ fn bins_that_always_count_are_finite() {
         background_per_bin: 0.01,
         sigma_bins: 0.74,
     };
-    assert!(response.chances(&light).contains(&1.0));
+    let chances = response.chances(&light);
+    assert!(chances.iter().any(|chance| *chance > 1.0 - 1e-12));
     let local = likelihood.at(&light, Steps::Fine);
     let numbers = local.score.iter().chain(local.information.iter().flatten());
     assert!(numbers.chain([&local.deviance]).all(|n| n.is_finite()));

@@ -8,9 +8,10 @@
 
 use super::{WalkCorrection, WalkLeft};
 use crate::chip::EventType;
-use crate::ranging::expected::{EchoLight, share_before};
+use crate::ranging::expected::EchoLight;
 use crate::ranging::likelihood::{BESIDE, Fit, Likelihood};
 use crate::ranging::peak::Peak;
+use crate::ranging::pulse::share_before;
 
 /// Ambiguity: another light whose deviance is larger by less than [`AS_GOOD`], at a place more than [`ELSEWHERE`]
 /// bounds away.
@@ -42,7 +43,8 @@ impl WalkCorrection {
         let (step, fits) = match edge {
             Some((bin, _)) if edge_is_seen(bin) && is_short => (0.1, 4),
             Some((bin, _)) if edge_is_seen(bin) && !has_threshold => (0.4, 2),
-            // With a THRESHOLD few bins count, and several lights may explain them.
+            // With a THRESHOLD few bins count, and several lights may explain them: with 8 fits for 24, one more depth of 512 was a hundredth of its bound beside.
+            Some(_) if has_threshold => (0.2, 8),
             Some(_) => (0.2, 24),
             None => (0.2, 8),
         };
