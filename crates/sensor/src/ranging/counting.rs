@@ -87,7 +87,7 @@ impl Counting {
             // 1 − qⁿ = (1 − q)(1 + q + … + qⁿ⁻¹), by doubling.
             let (mut sum, mut power, mut before) = (1.0, silent, 1.0);
             for bit in (0..self.spads.ilog2()).rev() {
-                before = before * power;
+                before *= power;
                 sum *= 1.0 + power;
                 power *= power;
                 if self.spads >> bit & 1 == 1 {
@@ -100,8 +100,9 @@ impl Counting {
         }
         let (mut sum, mut term, mut none) = (1.0, 1.0, 1.0);
         let mut ways = 1.0;
-        for others in 1..self.spads - self.threshold {
-            let growth = (self.threshold + others) as f64 * INVERSE[others];
+        let inverse = &INVERSE[..self.spads - self.threshold];
+        for (others, inverse) in inverse.iter().enumerate().skip(1) {
+            let growth = (self.threshold + others) as f64 * inverse;
             ways *= growth;
             term *= silent * growth;
             none *= silent;
