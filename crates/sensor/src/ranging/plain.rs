@@ -6,9 +6,10 @@
 //! ```
 //!
 //! These are the sums of [`spad_state`](super::spad_state), with steps that may differ in length: time goes finely only under the pulse and a
-//! dead time later. What had fired by a time between two steps comes from a cubic, so that 32 steps of a bin are as good as 96 with straight lines.
-//! A histogram takes some hundred steps, and a fit some ten histograms; therefore exponentials come as vectors, and what one step waits
-//! for of the one before is a product and a sum.
+//! dead time later. What had fired by a time between two steps comes from a cubic, so that fewer steps do: of 256 places in 10³ to 10⁴ photons,
+//! with 32 steps of a bin 6 are more than a tenth of their bound beside those of very fine steps (180 more than a hundredth), and with straight
+//! lines and 96 steps in all bins 4 (55). A histogram takes some fifty to three hundred steps, and a fit some ten histograms; therefore exponentials
+//! come as vectors, and what one step waits for of the one before is a product and a sum.
 
 #![allow(
     unsafe_code,
