@@ -9,7 +9,8 @@
 //! dead time later. What had fired by a time between two steps comes from a cubic, so that fewer steps do: of 256 places in 10³ to 10⁴ photons,
 //! with 32 steps of a bin 6 are more than a tenth of their bound beside those of very fine steps (180 more than a hundredth), and with straight
 //! lines and 96 steps in all bins 4 (55). A histogram takes some fifty to three hundred steps, and a fit some ten histograms; therefore exponentials
-//! come as vectors, and what one step waits for of the one before is a product and a sum.
+//! come as vectors, and what one step waits for of the one before is a product and a sum. Of lights side by side
+//! each is a lane of the vectors: starts of a search, and fits that climb together.
 
 #![allow(
     unsafe_code,
@@ -38,10 +39,20 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// Those of `bins` bins: `steps` in each with light of the pulse, and in each where SPADs recover from it a dead time of `dead` bins later.
-    pub(super) fn new(first_bin: f64, bins: usize, pulse: &Pulse, steps: usize, dead: f64) -> Self {
-        let [from, to] = pulse.within(BEGINS, ENDS);
-        let is_lit = |begin: f64| begin + 1.0 > from && begin < to;
+    /// Those of `bins` bins: `steps` in each with light of a pulse, and in each where SPADs recover from it a dead time of `dead` bins later.
+    pub(super) fn new(
+        first_bin: f64,
+        bins: usize,
+        pulses: &[Pulse],
+        steps: usize,
+        dead: f64,
+    ) -> Self {
+        let is_lit = |begin: f64| {
+            pulses.iter().any(|pulse| {
+                let [from, to] = pulse.within(BEGINS, ENDS);
+                begin + 1.0 > from && begin < to
+            })
+        };
         let of_bin = |bin| {
             let begin = first_bin - 0.5 + bin as f64;
             if is_lit(begin) || is_lit(begin - dead) {
@@ -123,6 +134,29 @@ fn cubic(time: f64, times: &[f64]) -> [f64; 4] {
     ]
 }
 
+/// What had fired a dead time before the end of each step: these parts of four sums in a row, from the first of these.
+#[inline(always)]
+fn parts_before(times: &[f64], dead: f64) -> Vec<(usize, [f64; 4])> {
+    let mut parts = Vec::with_capacity(times.len());
+    // The time before which a dead time ends.
+    let mut at = 0;
+    for step in 0..times.len() - 1 {
+        let ends = times[step + 1] - dead;
+        while times[at] < ends {
+            at += 1;
+        }
+        parts.push(if at >= 2 && at < step {
+            (at - 2, cubic(ends, &times[at - 2..at + 2]))
+        } else if at >= 1 {
+            let part = (ends - times[at - 1]) / (times[at] - times[at - 1]);
+            (at - 1, [1.0 - part, part, 0.0, 0.0])
+        } else {
+            (0, [1.0 + (ends - times[0]) / dead, 0.0, 0.0, 0.0])
+        });
+    }
+    parts
+}
+
 /// What comes of a step.
 #[derive(Debug, Clone, Copy, Default)]
 struct Step {
@@ -162,23 +196,10 @@ pub(super) fn fired<const K: usize>(
         falls[step] = hits.falls;
     }
     let mut laws = vec![Step::default(); count];
-    // The time before which a dead time ends.
-    let mut at = 0;
-    for (step, law) in laws.iter_mut().enumerate() {
-        let ends = times[step + 1] - dead;
-        while times[at] < ends {
-            at += 1;
-        }
+    let parts = parts_before(&times, dead);
+    for ((step, law), (first, parts)) in laws.iter_mut().enumerate().zip(parts) {
         let of_pulse = until[step + 1] - until[step];
         let of_background = background * (times[step + 1] - times[step]);
-        let (first, parts) = if at >= 2 && at < step {
-            (at - 2, cubic(ends, &times[at - 2..at + 2]))
-        } else if at >= 1 {
-            let part = (ends - times[at - 1]) / (times[at] - times[at - 1]);
-            (at - 1, [1.0 - part, part, 0.0, 0.0])
-        } else {
-            (0, [1.0 + (ends - times[0]) / dead, 0.0, 0.0, 0.0])
-        };
         *law = Step {
             hit: (of_pulse + of_background) * missed[step],
             none: none[step],
@@ -247,4 +268,111 @@ pub(super) fn fired<const K: usize>(
         });
         from = to;
     }
+}
+
+/// Lights whose chances are found at once: numbers of a vector of 512 bits, and two of 256.
+pub(super) const LANES: usize = 8;
+
+/// A number of each of these lights.
+type Lanes = [f64; LANES];
+
+/// The same as [`fired`] for some lights at once, each with its own pulse and background, in the same steps.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(super) fn fired_by_each<const K: usize>(
+    (pulses, background): (&[Pulse; LANES], &Lanes),
+    steps: &Steps,
+    dead: f64,
+) -> Vec<[Dual<K>; LANES]> {
+    let times = steps.times();
+    let count = times.len() - 1;
+    let with_slopes = if K > 0 { count + 1 } else { 0 };
+    let mut until = vec![[0.0; LANES]; count + 1];
+    let mut by_place = vec![[0.0; LANES]; with_slopes];
+    let mut by_width = vec![[0.0; LANES]; if K > 3 { count + 1 } else { 0 }];
+    for (lane, pulse) in pulses.iter().enumerate() {
+        pulse.until_each_in(&times, |at, values| {
+            until[at][lane] = values[0];
+            if K > 0 {
+                by_place[at][lane] = values[1];
+            }
+            if K > 3 {
+                by_width[at][lane] = values[2];
+            }
+        });
+    }
+    let start: [Dual<4>; LANES] = background.map(|background| steady(background, dead));
+    let mut sums = vec![[0.0; LANES]; count + 4];
+    let mut slopes = vec![[[0.0; LANES]; K]; if K > 0 { count + 4 } else { 1 }];
+    let mut sum: Lanes = std::array::from_fn(|l| start[l].value * dead);
+    let mut sum_slopes: [Lanes; K] =
+        std::array::from_fn(|k| std::array::from_fn(|l| start[l].slope[k] * dead));
+    let mut ready = sum.map(|sum| 1.0 - sum);
+    let mut ready_slopes = sum_slopes.map(|slopes| slopes.map(|slope| -slope));
+    let mut ended = [0.0; LANES];
+    let mut ended_slopes = [[0.0; LANES]; K];
+    sums[0] = sum;
+    slopes[0] = sum_slopes;
+    for (step, (first, [a, b, c, d])) in parts_before(&times, dead).into_iter().enumerate() {
+        let length = times[step + 1] - times[step];
+        let (from, to) = (&until[step], &until[step + 1]);
+        let [w, x, y, z]: &[Lanes; 4] = sums[first..first + 4].try_into().expect("four");
+        let mut more = [0.0; LANES];
+        let mut of_ready = [[0.0; LANES]; 2];
+        let mut of_ending = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let photons = to[l] - from[l] + background[l] * length;
+            let Hits {
+                none,
+                missed,
+                falls,
+            } = Hits::new(photons);
+            let (hit, late) = (photons * missed, 1.0 - missed);
+            let now = (w[l] * a + x[l] * b) + (y[l] * c + z[l] * d);
+            let ending = now - ended[l];
+            ended[l] = now;
+            more[l] = ready[l] * none + ending * falls;
+            sum[l] += ready[l] * hit + ending * late;
+            ready[l] = ready[l] * none + ending * missed;
+            of_ready[0][l] = hit;
+            of_ready[1][l] = none;
+            of_ending[0][l] = late;
+            of_ending[1][l] = missed;
+        }
+        sums[step + 1] = sum;
+        if K == 0 {
+            continue;
+        }
+        let [w, x, y, z]: &[[Lanes; K]; 4] = slopes[first..first + 4].try_into().expect("four");
+        for k in 0..K {
+            for l in 0..LANES {
+                // Place, ln signal, ln background and ln width.
+                let photons = match k {
+                    0 => by_place[step + 1][l] - by_place[step][l],
+                    1 => to[l] - from[l],
+                    2 => background[l] * length,
+                    _ => by_width[step + 1][l] - by_width[step][l],
+                };
+                let now = (w[k][l] * a + x[k][l] * b) + (y[k][l] * c + z[k][l] * d);
+                let ending = now - ended_slopes[k][l];
+                ended_slopes[k][l] = now;
+                let more = photons * more[l];
+                let was_ready = ready_slopes[k][l];
+                sum_slopes[k][l] += was_ready * of_ready[0][l] + ending * of_ending[0][l] + more;
+                ready_slopes[k][l] = was_ready * of_ready[1][l] + ending * of_ending[1][l] - more;
+            }
+        }
+        slopes[step + 1] = sum_slopes;
+    }
+    let mut from = 0;
+    let of_bin = |&of_bin: &usize| {
+        let to = from + of_bin;
+        let of_lane = |l: usize| Dual {
+            value: sums[to][l] - sums[from][l],
+            slope: std::array::from_fn(|k| slopes[to][k][l] - slopes[from][k][l]),
+        };
+        let fired = std::array::from_fn(of_lane);
+        from = to;
+        fired
+    };
+    steps.of_bins.iter().map(of_bin).collect()
 }

@@ -57,28 +57,43 @@ impl Pulse {
     /// Photons until each of some times, which rise, and the slopes of these photons with place and ln width.
     pub(super) fn until_each(&self, times: &[f64]) -> [Vec<f64>; 3] {
         let mut rows = [(); 3].map(|()| vec![0.0; times.len()]);
-        let first = times.partition_point(|time| *time <= self.starts);
-        let end = times.partition_point(|time| *time < self.ends);
-        rows[0][end..].fill(self.signal);
-        for at in first..end {
-            let now = self.at(times[at]);
-            for (row, value) in rows.iter_mut().zip(now) {
+        self.until_each_in(times, |at, values| {
+            for (row, value) in rows.iter_mut().zip(values) {
                 row[at] = value;
             }
-        }
+        });
         rows
     }
 
-    /// The same at a time at which the pulse goes on.
-    #[inline]
-    fn at(&self, time: f64) -> [f64; 3] {
+    /// The same, told with the number of each time by which some photons have come.
+    #[inline(always)]
+    pub(super) fn until_each_in(&self, times: &[f64], mut tell: impl FnMut(usize, [f64; 3])) {
+        let first = times.partition_point(|time| *time <= self.starts);
+        let end = times.partition_point(|time| *time < self.ends);
+        if let Some(tail) = &self.tail {
+            for at in first..end {
+                tell(at, self.with_tail(tail, times[at]));
+            }
+        } else {
+            let table = &*TABLE;
+            let per_sigma = 1.0 / self.sigma;
+            for at in first..end {
+                let z = (times[at] - self.centre) * per_sigma;
+                let (share, density) = share_in(table, z);
+                let by_z = -self.signal * density;
+                tell(at, [self.signal * share, by_z * per_sigma, by_z * z]);
+            }
+        }
+        for at in end..times.len() {
+            tell(at, [self.signal, 0.0, 0.0]);
+        }
+    }
+
+    /// The same at a time at which the pulse goes on, with late avalanches.
+    fn with_tail(&self, tail: &Tail, time: f64) -> [f64; 3] {
         let (signal, sigma) = (self.signal, self.sigma);
         let z = (time - self.centre) / sigma;
         let (share, density) = share_before(z);
-        let Some(tail) = self.tail else {
-            let by_place = -signal * density / sigma;
-            return [signal * share, by_place, by_place * z * sigma];
-        };
         let [late, late_density, by_width] = late_edge(time - self.centre, sigma, tail.bins);
         let both = |prompt: f64, late: f64| signal * (prompt + tail.share * (late - prompt));
         [
@@ -105,14 +120,17 @@ static TABLE: LazyLock<Vec<Point>> = LazyLock::new(|| {
 });
 
 /// Share of the pulse that comes before `z` standard deviations after its centre, and its slope with z.
-#[inline]
 pub(super) fn share_before(z: f64) -> (f64, f64) {
+    share_in(&TABLE, z)
+}
+
+#[inline(always)]
+fn share_in(table: &[Point], z: f64) -> (f64, f64) {
     let at = (z + REACH) * POINTS;
     if !(0.0..2.0 * REACH * POINTS).contains(&at) {
         return (f64::from(u8::from(z > 0.0)), 0.0);
     }
     let first = at as usize;
-    let table = &*TABLE;
     let ((from, slope_from), (to, slope_to)) = (table[first], table[first + 1]);
     let (u, h) = (at - first as f64, 1.0 / POINTS);
     let v = 1.0 - u;

@@ -28,7 +28,7 @@ use crate::chip::EventType;
 mod many_starts;
 
 /// Shares of the most background with which the best fit under a THRESHOLD is tried again: chosen. Of 495 random lights under a
-/// THRESHOLD six were fitted more than half a bound beside without, and one was when each was tried.
+/// THRESHOLD six were fitted more than half a bound beside without, and one is with it.
 const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 
 /// Deviance that a width of its own must save (Akaike).
@@ -213,11 +213,11 @@ impl WalkCorrection {
         if self.response.counting.threshold > 0 {
             return Ok(best);
         }
-        let mut fits = vec![wide.maximise(&best.light)];
+        let mut starts = vec![best.light];
         if best.bound_bins > WELL_KNOWN {
-            let deep = self.deep_start(wide, &best.light);
-            fits.extend(deep.map(|deep| wide.maximise(&deep)));
+            starts.extend(self.deep_start(wide, &best.light));
         }
+        let mut fits = wide.maximise_each(&starts);
         fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
         // A width that hardly explains more would only pull the place after it.
         let is_worth_it = |fit: &&Fit| fit.deviance + OF_A_WIDTH < best.deviance;
@@ -261,7 +261,8 @@ impl WalkCorrection {
             sigma_bins: self.response.pulse_sigma_bins.max(DEEP_BINS),
             ..all
         });
-        let judged = lights.map(|light| (likelihood.deviance(&light), light));
+        let lights: Vec<EchoLight> = lights.collect();
+        let judged = likelihood.deviances(&lights).into_iter().zip(lights);
         let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
         best.map(|(_, light)| light)
     }
@@ -354,7 +355,7 @@ impl WalkCorrection {
     }
 
     /// The best of a fit and of those with less background. Under a THRESHOLD bins without an echo say next to nothing of the background, and
-    /// fits stay where it is too much. The best of some backgrounds is freed, if it is better; the others are rivals.
+    /// fits stay where it is too much.
     fn darker(&self, likelihood: &Likelihood<'_>, best: Fit) -> Fit {
         if self.response.counting.threshold == 0 {
             return best;
@@ -363,21 +364,16 @@ impl WalkCorrection {
             free: IN_REGION,
             ..likelihood.clone()
         };
-        let mut light = best.light;
-        let held = DARKER.map(|share| {
-            light.background_per_bin = share * likelihood.most_background;
-            let fit = held.maximise(&light);
-            light = fit.light;
-            fit
+        let starts = DARKER.map(|share| EchoLight {
+            background_per_bin: share * likelihood.most_background,
+            ..best.light
         });
-        let least = held.iter().min_by(|a, b| a.deviance.total_cmp(&b.deviance));
-        let better = least.filter(|fit| fit.deviance < best.deviance);
-        let freed = better.map(|fit| likelihood.maximise(&fit.light));
-        let mut fits: Vec<Fit> = freed.into_iter().chain([best]).collect();
+        let near = held.near_each(&starts);
+        let lights: Vec<EchoLight> = near.iter().map(|fit| fit.light).collect();
+        let mut fits = vec![best];
+        fits.extend(likelihood.maximise_each(&lights));
         fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
-        let first = fits[0];
-        fits.extend(held);
-        with_rivals(first, &fits, likelihood)
+        with_rivals(fits[0], &fits, likelihood)
     }
 
     /// The widest echo, whose ends are to be seen either side of it.
