@@ -39,7 +39,7 @@ pub fn floor(x: f64) -> f64 {
 
 /// eˣ for −708 ≤ x ≤ 709; 0 for less.
 #[inline(always)]
-pub(crate) fn exp(x: f64) -> f64 {
+pub fn exp(x: f64) -> f64 {
     const INVERSE_FACTORIALS: [f64; 14] = {
         let mut inverse = [1.0; 14];
         let mut k = 1;

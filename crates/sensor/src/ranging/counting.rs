@@ -10,6 +10,17 @@
 use crate::chip::{EventType, MOST_SPADS};
 use crate::numerics::Dual;
 
+/// 1/n.
+const INVERSE: [f64; MOST_SPADS + 1] = {
+    let mut inverse = [0.0; MOST_SPADS + 1];
+    let mut n = 1;
+    while n <= MOST_SPADS {
+        inverse[n] = 1.0 / n as f64;
+        n += 1;
+    }
+    inverse
+};
+
 /// What the correlation block asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Counting {
@@ -34,11 +45,10 @@ impl Counting {
     pub(super) fn chance<const K: usize>(&self, fired: Dual<K>, children: Dual<K>) -> Dual<K> {
         let clamped = fired.value.clamp(0.0, 1.0);
         let of_all = self.spads as f64;
-        if (self.event_type, self.threshold) == (EventType::Greater, 0) {
-            // A neighbour fires only where something has.
-            let silent = libm::log1p(-clamped);
-            let none = libm::exp((of_all - 1.0) * silent);
-            return fired.chain(-libm::expm1(of_all * silent), of_all * none);
+        // A neighbour fires only where something has.
+        let children_count = self.threshold > 0 && children.value > 0.0;
+        if self.event_type == EventType::Greater && !children_count {
+            return self.chance_of_more(fired);
         }
         // Of one SPAD fewer: what P(n) is made of, and its slope.
         let others = self.spads - 1;
@@ -63,6 +73,44 @@ impl Counting {
         }
         let children = children.chain(0.0, by_children);
         fired.chain(value, by_fired) + children
+    }
+
+    /// The chance that more SPADs than THRESHOLD fire, each with chance `fired`: where one more than it has fired, so many did before, and the
+    /// others among those did not.
+    fn chance_of_more<const K: usize>(&self, fired: Dual<K>) -> Dual<K> {
+        if self.threshold >= self.spads {
+            return Dual::ZERO;
+        }
+        let chance = fired.value.clamp(0.0, 1.0);
+        let silent = 1.0 - chance;
+        if self.threshold == 0 {
+            // 1 − qⁿ = (1 − q)(1 + q + … + qⁿ⁻¹), by doubling.
+            let (mut sum, mut power, mut before) = (1.0, silent, 1.0);
+            for bit in (0..self.spads.ilog2()).rev() {
+                before *= power;
+                sum *= 1.0 + power;
+                power *= power;
+                if self.spads >> bit & 1 == 1 {
+                    before = power;
+                    sum += power;
+                    power *= silent;
+                }
+            }
+            return fired.chain(chance * sum, self.spads as f64 * before);
+        }
+        let (mut sum, mut term, mut none) = (1.0, 1.0, 1.0);
+        let mut ways = 1.0;
+        let inverse = &INVERSE[..self.spads - self.threshold];
+        for (others, inverse) in inverse.iter().enumerate().skip(1) {
+            let growth = (self.threshold + others) as f64 * inverse;
+            ways *= growth;
+            term *= silent * growth;
+            none *= silent;
+            sum += term;
+        }
+        let before: f64 = (0..self.threshold).map(|_| chance).product();
+        let slope = self.spads as f64 * ways * before * none;
+        fired.chain(before * chance * sum, slope)
     }
 
     /// The chance that a bin counts in which `n` SPADs fired by light, and its slope with `children`.

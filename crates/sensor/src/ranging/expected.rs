@@ -14,13 +14,13 @@
 //!
 //! Assumed: SPADs alike ([`dead_times`](super::dead_times) says what it costs where they are not), and recovered from the echo before the next laser cycle's.
 
-use std::sync::LazyLock;
-
 use super::counting::Counting;
+use super::plain::{self, LANES};
+use super::pulse::{PULSE_REACH, Pulse, Tail};
 use super::spad_state::{Dead, Spad};
 use crate::chip::{EventType, SensorConfig};
-use crate::numerics::{Dual, normal_above, normal_density};
-use crate::photon::{EchoWidth, TAIL_REACH, late_edge};
+use crate::numerics::Dual;
+use crate::photon::{EchoWidth, TAIL_REACH};
 
 /// Steps to a bin, at least.
 const STEPS: usize = 4;
@@ -31,8 +31,14 @@ const STEPS_OF_DEAD_TIME: f64 = 12.0;
 const STEPS_OF_RATE: f64 = 8.0;
 const MOST_STEPS: f64 = 96.0;
 
-/// Standard deviations from its centre where a pulse begins and ends: 10⁻¹¹ of it is left out, less than a photon of 10¹⁰.
-const PULSE_REACH: f64 = 6.7;
+/// The same of plain SPADs, whose steps are better, and steps to a standard deviation of their pulse.
+const PLAIN_STEPS: usize = 3;
+const PLAIN_STEPS_OF_RATE: f64 = 16.0;
+const MOST_PLAIN_STEPS: f64 = 32.0;
+const STEPS_OF_SIGMA: f64 = 1.5;
+
+/// Lights of plain SPADs from which on it pays to find the chances of all at once: with three, bright short pulses took a twentieth longer.
+const WORTH_LANES: usize = 5;
 
 /// Shortest pulse, bins: with one that takes no time, no place near the end of a bin explains a few counts in the next one.
 const LEAST_SIGMA: f64 = 0.02;
@@ -60,14 +66,6 @@ pub(super) enum Steps {
     Coarse,
     /// As finely as the light needs.
     Fine,
-}
-
-/// Photons whose avalanches are late ([`DiffusionTail`](crate::photon::DiffusionTail)).
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Tail {
-    share: f64,
-    /// Time constant.
-    bins: f64,
 }
 
 /// How a macropixel answers to light.
@@ -173,18 +171,27 @@ impl Response {
         self.tail.map_or(0.0, |tail| TAIL_REACH * tail.bins)
     }
 
-    /// Steps to a bin.
+    /// Steps to a bin; of plain SPADs in bins where the pulse or what recovers from it needs them.
     fn steps(&self, light: &EchoLight, steps: Steps) -> usize {
         let sigma = light.sigma_bins.max(1e-3);
+        let (least, of_rate, most) = if self.dead.is_plain() {
+            let of_pulse = (STEPS_OF_SIGMA / sigma).min(MOST_PLAIN_STEPS);
+            let least = PLAIN_STEPS.max(of_pulse.ceil() as usize);
+            (least, PLAIN_STEPS_OF_RATE, MOST_PLAIN_STEPS)
+        } else {
+            let of_dead_time = (2.0 / self.dead.time_bins).min(16.0);
+            let least = STEPS.max(of_dead_time.ceil() as usize);
+            (least, STEPS_OF_RATE, MOST_STEPS)
+        };
         let fires_once = self.dead.time_bins >= 2.0 * PULSE_REACH * sigma + self.tail_bins();
         if steps == Steps::Coarse || fires_once && self.dead.time_bins >= 2.0 {
-            return STEPS.max((2.0 / self.dead.time_bins).min(16.0).ceil() as usize);
+            return least;
         }
         // Within the pulse SPADs fire again, and each firing is as sharp as the light is strong.
         let rate = 0.4 * light.signal / (self.counting.spads as f64 * sigma);
         let of_dead_time = STEPS_OF_DEAD_TIME / self.dead.time_bins;
-        let wanted = of_dead_time.max(STEPS_OF_RATE * rate).min(MOST_STEPS);
-        (wanted.ceil() as usize).max(STEPS)
+        let wanted = of_dead_time.max(of_rate * rate).min(most);
+        (wanted.ceil() as usize).max(least)
     }
 
     /// The chances with their slopes with the first K parameters.
@@ -193,7 +200,98 @@ impl Response {
         light: &EchoLight,
         steps: Steps,
     ) -> Vec<Dual<K>> {
-        self.chances_by(light, self.steps(light, steps))
+        let steps = self.steps(light, steps);
+        if self.dead.is_plain() {
+            self.chances_of_plain(light, steps)
+        } else {
+            self.chances_by(light, steps)
+        }
+    }
+
+    /// The same of some lights.
+    pub(super) fn chances_of_each<const K: usize>(
+        &self,
+        lights: &[EchoLight],
+        steps: Steps,
+    ) -> Vec<Vec<Dual<K>>> {
+        let some = lights.chunks(LANES);
+        let of_some = some.flat_map(|lights| {
+            if self.dead.is_plain() && lights.len() >= WORTH_LANES {
+                self.chances_in_lanes(lights, steps)
+            } else {
+                let of_light = |light| self.chances_of(light, steps);
+                lights.iter().map(of_light).collect()
+            }
+        });
+        of_some.collect()
+    }
+
+    /// The same of plain SPADs and no more lights than lanes.
+    fn chances_in_lanes<const K: usize>(
+        &self,
+        lights: &[EchoLight],
+        steps: Steps,
+    ) -> Vec<Vec<Dual<K>>> {
+        let spads = self.counting.spads as f64;
+        let of_lanes: [&EchoLight; LANES] =
+            std::array::from_fn(|lane| &lights[lane.min(lights.len() - 1)]);
+        let pulses = of_lanes.map(|light| self.pulse(light));
+        let background = of_lanes.map(|light| light.background_per_bin / spads);
+        let steps = of_lanes.map(|light| self.steps(light, steps));
+        let most_steps = steps.into_iter().max().expect("a lane");
+        let begins = pulses.iter().map(|pulse| self.begin_bin(pulse));
+        let begin_bin = begins.fold(f64::INFINITY, f64::min);
+        let unlit = begin_bin.max(0.0) as usize;
+        let before = (-begin_bin).max(0.0) as usize;
+        let bins = self.bins + before - unlit;
+        let dead = self.dead.time_bins;
+        let steps = plain::Steps::new(begin_bin, bins, &pulses, most_steps, dead);
+        let fired = plain::fired_by_each::<K>((&pulses, &background), &steps, dead);
+        let chances_of = |lane: usize| {
+            let steady = plain::steady(background[lane], dead);
+            let lit = fired[before..].iter().map(|fired| fired[lane]);
+            let fired = std::iter::repeat_n(steady, unlit).chain(lit);
+            let chances = fired.map(|fired| self.counting.chance(fired, Dual::ZERO));
+            chances.collect()
+        };
+        (0..lights.len()).map(chances_of).collect()
+    }
+
+    /// Light of the echo on a SPAD.
+    fn pulse(&self, light: &EchoLight) -> Pulse {
+        Pulse::new(
+            light.signal / self.counting.spads as f64,
+            light.position_bins,
+            light.sigma_bins.max(1e-6),
+            self.tail,
+        )
+    }
+
+    /// The bin with which a pulse begins; of one long before the first bin nothing is left.
+    fn begin_bin(&self, pulse: &Pulse) -> f64 {
+        let forgotten = -8.0 - 2.0 * self.dead.time_bins - 2.0 * (pulse.ends - pulse.starts);
+        (pulse.starts + 0.5)
+            .clamp(forgotten, self.bins as f64)
+            .floor()
+    }
+
+    /// The same of plain SPADs.
+    fn chances_of_plain<const K: usize>(&self, light: &EchoLight, steps: usize) -> Vec<Dual<K>> {
+        let (pulse, dead) = (self.pulse(light), self.dead.time_bins);
+        let background = light.background_per_bin / self.counting.spads as f64;
+        let begin_bin = self.begin_bin(&pulse);
+        let unlit = begin_bin.max(0.0) as usize;
+        let before = (-begin_bin).max(0.0) as usize;
+        let bins = self.bins + before - unlit;
+        let steps = plain::Steps::new(begin_bin, bins, &[pulse], steps, dead);
+        let mut fired = Vec::with_capacity(unlit + bins);
+        fired.resize(unlit, plain::steady(background, dead));
+        plain::fired((&pulse, background), &steps, dead, &mut fired);
+        fired.drain(..before);
+        for fired in &mut fired {
+            *fired = self.counting.chance(*fired, Dual::ZERO);
+        }
+        fired
     }
 
     fn chances_by<const K: usize>(&self, light: &EchoLight, steps_per_bin: usize) -> Vec<Dual<K>> {
@@ -201,49 +299,13 @@ impl Response {
             value,
             slope: std::array::from_fn(|parameter| slopes[parameter]),
         };
-        let per_spad = 1.0 / self.counting.spads as f64;
-        let signal = light.signal * per_spad;
-        let background = light.background_per_bin * per_spad;
+        let background = light.background_per_bin / self.counting.spads as f64;
         let background = dual(background, [0.0, 0.0, background, 0.0]);
-        let sigma = light.sigma_bins.max(1e-6);
         let h = 1.0 / steps_per_bin as f64;
-
-        // Light of the pulse on a SPAD until a time.
-        let late = self.tail.map_or(0.0, |tail| tail.share * tail.bins);
-        let centre = light.position_bins - late;
-        let (starts, ends) = (
-            centre - PULSE_REACH * sigma,
-            centre + PULSE_REACH * sigma + self.tail_bins(),
-        );
-        let seen = |time: f64| -> Dual<K> {
-            if time <= starts || time >= ends {
-                let value = if time <= starts { 0.0 } else { signal };
-                return dual(value, [0.0, value, 0.0, 0.0]);
-            }
-            let z = (time - centre) / sigma;
-            let (share, density) = share_before(z);
-            if let Some(tail) = self.tail {
-                let [late, late_density, by_width] = late_edge(time - centre, sigma, tail.bins);
-                let both =
-                    |prompt: f64, late: f64| signal * (prompt + tail.share * (late - prompt));
-                let value = both(share, late);
-                let slopes = [
-                    -both(density / sigma, late_density),
-                    value,
-                    0.0,
-                    both(-z * density, by_width),
-                ];
-                return dual(value, slopes);
-            }
-            let (value, by_place) = (signal * share, -signal * density / sigma);
-            dual(value, [by_place, value, 0.0, by_place * z * sigma])
-        };
+        let pulse = self.pulse(light);
         // Before the pulse the SPADs are as the background alone leaves them: nothing happens before it begins.
         let last = self.bins as f64 - 0.5;
-        // Of an echo long before the first bin nothing is left.
-        let forgotten =
-            -8.0 - 2.0 * self.dead.time_bins - 4.0 * PULSE_REACH * sigma - 2.0 * self.tail_bins();
-        let begin_bin = (starts + 0.5).clamp(forgotten, self.bins as f64).floor();
+        let begin_bin = self.begin_bin(&pulse);
         let begin = begin_bin - 0.5;
         let mut chances = Vec::with_capacity(self.bins);
         let mut spad = Spad::steady(&self.dead, background, h);
@@ -259,60 +321,23 @@ impl Response {
             chances.push(steady);
         }
         let steps = ((last - begin) / h).round() as usize;
-        let mut seen_before = seen(begin);
+        let times: Vec<f64> = (0..=steps).map(|step| begin + step as f64 * h).collect();
+        let [until, by_place, by_width] = pulse.until_each(&times);
         for step in 0..steps {
-            let time = begin + (step + 1) as f64 * h;
+            let time = times[step + 1];
             if step % steps_per_bin == 0 {
                 spad.begin_bin();
             }
-            let seen_after = seen(time);
-            spad.step(background * h + (seen_after - seen_before));
-            seen_before = seen_after;
+            let growth = |row: &[f64]| row[step + 1] - row[step];
+            let signal = growth(&until);
+            let slopes = [growth(&by_place), signal, 0.0, growth(&by_width)];
+            spad.step(background * h + dual(signal, slopes));
             if (step + 1) % steps_per_bin == 0 && time > 0.0 {
                 chances.push(spad.chance(&self.counting));
             }
         }
         chances
     }
-}
-
-// The edge of a Gaussian pulse: the share of it that has come, from a table.
-//
-// A histogram of 16 bins asks for a hundred of them. Between its points the table is a cubic of the right values and
-// slopes, which is right to 3·10⁻⁹ of the pulse, and to 10⁻⁵ of the share itself where that is above 10⁻⁹.
-
-/// Where the table ends, standard deviations either side, and its points to each.
-const REACH: f64 = 7.0;
-const POINTS: f64 = 32.0;
-
-/// Share and density.
-type Point = (f64, f64);
-
-static TABLE: LazyLock<Vec<Point>> = LazyLock::new(|| {
-    let points = (2.0 * REACH * POINTS) as usize;
-    let at = |i: usize| i as f64 / POINTS - REACH;
-    (0..=points + 1)
-        .map(|i| (normal_above(-at(i)), normal_density(at(i))))
-        .collect()
-});
-
-/// Share of the pulse that comes before `z` standard deviations after its centre, and its slope with z.
-#[inline]
-pub(super) fn share_before(z: f64) -> (f64, f64) {
-    let at = (z + REACH) * POINTS;
-    if !(0.0..2.0 * REACH * POINTS).contains(&at) {
-        return (f64::from(u8::from(z > 0.0)), 0.0);
-    }
-    let first = at as usize;
-    let table = &*TABLE;
-    let ((from, slope_from), (to, slope_to)) = (table[first], table[first + 1]);
-    let (u, h) = (at - first as f64, 1.0 / POINTS);
-    let v = 1.0 - u;
-    let rise = to - from;
-    let (a, b) = (slope_from * h - rise, rise - slope_to * h);
-    let bend = v * a + u * b;
-    let share = from + u * (rise + v * bend);
-    (share, POINTS * (rise + (v - u) * bend + u * v * (b - a)))
 }
 
 #[cfg(test)]

@@ -12,10 +12,21 @@
 //!
 //! The maximum is found by Fisher scoring, damped where it overshoots (Levenberg and Marquardt).
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use std::ops::Range;
 
+use multiversion::multiversion;
+use smallvec::SmallVec;
+
 use super::expected::{EchoLight, PARAMETERS, Response, Steps};
-use crate::numerics::Dual;
+use crate::numerics::{Dual, branchless};
+
+/// Bins of a histogram for which sums need no memory of their own.
+const MOST_BINS: usize = 16;
 
 /// Chances beyond which none is believed: a count that the model says never comes costs 21 in ln likelihood.
 const LEAST_CHANCE: f64 = 1e-9;
@@ -26,6 +37,9 @@ const ROUNDS: usize = 40;
 /// Where the next step would be less than so much of the parameters' standard deviations, squared; as many times as much as counts
 /// scatter more than they should, because a light that explains nothing need not be found exactly.
 const CLOSE: f64 = 1e-4;
+
+/// The same where only the deviance is asked for, and not the light.
+const ROUGHLY: f64 = 0.01;
 
 /// Standard deviations by which an echo's centre may lie beside the bins.
 pub(super) const BESIDE: f64 = 3.0;
@@ -41,6 +55,8 @@ pub(super) const WIDE_ECHO: Free = [true, true, true, true];
 pub(super) const IN_REGION: Free = [true, true, false, false];
 /// Width besides.
 pub(super) const WIDE_IN_REGION: Free = [true, true, false, true];
+/// What is left where the place is given.
+pub(super) const ONLY_SIGNAL: Free = [false, true, false, false];
 
 /// A histogram, and what may have made it.
 #[derive(Debug, Clone)]
@@ -96,34 +112,35 @@ struct Local {
 impl Likelihood<'_> {
     /// Twice the ln likelihood that is missing at these chances.
     fn deviance_of(&self, chances: impl Iterator<Item = f64>) -> f64 {
-        let bins = self.counts.iter().zip(chances).enumerate();
-        let seen = bins.filter(|(bin, _)| self.bins.contains(bin));
-        2.0 * seen
-            .map(|(_, (&counts, chance))| {
-                let chance = chance.clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE);
-                let missed = self.cycles - counts;
-                let share = |part: f64, chance: f64| match part > 0.0 {
-                    true => part * libm::log(part / (self.cycles * chance)),
-                    false => 0.0,
-                };
-                share(counts, chance) + share(missed, 1.0 - chance)
-            })
-            .sum::<f64>()
+        let chances: SmallVec<[f64; MOST_BINS]> = chances.collect();
+        let bins = self.bins.clone();
+        2.0 * missing(&self.counts[bins.clone()], &chances[bins], self.cycles)
     }
 
-    /// The deviance of some light, about.
-    pub(super) fn deviance(&self, light: &EchoLight) -> f64 {
-        let chances = self.response.chances_in(light, Steps::Coarse);
-        self.deviance_of(chances.into_iter())
+    /// The deviances of some lights, about.
+    pub(super) fn deviances(&self, lights: &[EchoLight]) -> Vec<f64> {
+        let chances = self.response.chances_of_each::<0>(lights, Steps::Coarse);
+        let of_light = |chances: &Vec<Dual<0>>| {
+            let values = chances.iter().map(|chance| chance.value);
+            self.deviance_of(values)
+        };
+        chances.iter().map(of_light).collect()
     }
 
-    fn at(&self, light: &EchoLight, steps: Steps) -> Local {
+    /// What the histogram says at each of some lights.
+    fn at_each(&self, lights: &[EchoLight], steps: Steps) -> Vec<Local> {
         match self.free {
-            WIDE_ECHO | WIDE_IN_REGION => {
-                self.local(light, self.response.chances_of::<4>(light, steps))
-            }
-            _ => self.local(light, self.response.chances_of::<3>(light, steps)),
+            WIDE_ECHO | WIDE_IN_REGION => self.locals::<4>(lights, steps),
+            ONLY_SIGNAL | IN_REGION => self.locals::<2>(lights, steps),
+            _ => self.locals::<3>(lights, steps),
         }
+    }
+
+    fn locals<const K: usize>(&self, lights: &[EchoLight], steps: Steps) -> Vec<Local> {
+        let chances = self.response.chances_of_each::<K>(lights, steps);
+        let both = lights.iter().zip(chances);
+        both.map(|(light, chances)| self.local(light, chances))
+            .collect()
     }
 
     /// What chances at `light` say, with their slopes with the first K parameters.
@@ -151,75 +168,66 @@ impl Likelihood<'_> {
 
     /// The most likely light near `start`.
     pub(super) fn maximise(&self, start: &EchoLight) -> Fit {
-        self.refined(&self.near(start))
+        self.maximise_each(&[*start]).remove(0)
+    }
+
+    /// The same near each of some starts.
+    pub(super) fn maximise_each(&self, starts: &[EchoLight]) -> Vec<Fit> {
+        self.refined_each(&self.near_each(starts))
     }
 
     /// The same, about: with the fewest steps.
-    pub(super) fn near(&self, start: &EchoLight) -> Fit {
-        self.maximise_in(start, Steps::Coarse)
+    pub(super) fn near_each(&self, starts: &[EchoLight]) -> Vec<Fit> {
+        self.maximise_in(starts, Steps::Coarse, CLOSE)
     }
 
-    /// The light that [`Self::near`] found, as finely as it needs.
-    pub(super) fn refined(&self, near: &Fit) -> Fit {
-        match self.response.needs_fine_steps(&near.light) {
-            true => self.maximise_in(&near.light, Steps::Fine),
-            false => *near,
-        }
+    /// The least deviance near a start, about, and a light that nearly has it: what is missing to it is reckoned from the slopes.
+    pub(super) fn roughly_near(&self, start: &EchoLight) -> Fit {
+        self.maximise_in(&[*start], Steps::Coarse, ROUGHLY)
+            .remove(0)
     }
 
-    fn maximise_in(&self, start: &EchoLight, steps: Steps) -> Fit {
-        let mut light = *start;
-        let mut local = self.at(&light, steps);
-        let mut damping = 0.0;
-        let mut has_converged = false;
-        let fitted = self.free.iter().filter(|free| **free).count();
-        let freedom = (self.bins.len() as f64 - fitted as f64).max(1.0);
-        for _ in 0..ROUNDS {
-            let Some(step) = self.step(&light, &local, damping) else {
-                damping = f64::max(10.0 * damping, 1e-3);
-                continue;
-            };
-            let gain: f64 = step
-                .iter()
-                .zip(local.score)
-                .map(|(step, score)| step * score)
-                .sum();
-            let next = self.moved(&light, step);
-            let close = CLOSE * (local.deviance / freedom).max(1.0);
-            if damping == 0.0 && gain < close {
-                has_converged = true;
+    /// The lights that [`Self::near_each`] found, as finely as they need.
+    pub(super) fn refined_each(&self, near: &[Fit]) -> Vec<Fit> {
+        let needs_fine = |fit: &&Fit| self.response.needs_fine_steps(&fit.light);
+        let starts = near.iter().filter(needs_fine).map(|fit| fit.light);
+        let starts: Vec<EchoLight> = starts.collect();
+        let mut fine = self.maximise_in(&starts, Steps::Fine, CLOSE).into_iter();
+        let refined = near.iter().map(|fit| {
+            let of_fit = needs_fine(&fit).then(|| fine.next().expect("one of each start"));
+            of_fit.unwrap_or(*fit)
+        });
+        refined.collect()
+    }
+
+    /// All climb side by side, because the chances of many lights cost little more than those of one.
+    fn maximise_in(&self, starts: &[EchoLight], steps: Steps, close: f64) -> Vec<Fit> {
+        let locals = self.at_each(starts, steps).into_iter();
+        let climbs = starts.iter().zip(locals);
+        let mut climbs: Vec<Climb> = climbs.map(|(light, at)| Climb::new(*light, at)).collect();
+        loop {
+            let mut under_way = Vec::new();
+            let mut lights = Vec::new();
+            for climb in &mut climbs {
+                if let Some(next) = climb.next(self, close) {
+                    lights.push(next);
+                    under_way.push(climb);
+                }
+            }
+            if lights.is_empty() {
                 break;
             }
-            let there = self.at(&next, steps);
-            // As far as rounding lets it be told.
-            if there.deviance <= local.deviance + 1e-9 * (1.0 + local.deviance) {
-                let gained = local.deviance - there.deviance;
-                let enough = gain < close && gained < close;
-                (light, local) = (next, there);
-                if enough {
-                    has_converged = true;
-                    break;
-                }
-                // Where much less was gained than promised, steps overshoot to and fro.
-                damping = match gained < 0.3 * gain {
-                    true => (3.0 * damping).max(0.3),
-                    false if damping > 1e-3 => damping / 10.0,
-                    false => 0.0,
-                };
-            } else {
-                damping = f64::max(10.0 * damping, 1e-2);
-                if damping > 1e9 {
-                    break;
-                }
+            let there = self.at_each(&lights, steps);
+            for ((climb, light), there) in under_way.into_iter().zip(lights).zip(there) {
+                climb.go_to(light, there);
             }
         }
-        Fit {
-            light,
-            deviance: local.deviance,
-            freedom,
-            has_converged,
-            bound_bins: self.bound_bins(&local),
-        }
+        climbs.into_iter().map(|climb| climb.fit(self)).collect()
+    }
+
+    fn freedom(&self) -> f64 {
+        let fitted = self.free.iter().filter(|free| **free).count();
+        (self.bins.len() as f64 - fitted as f64).max(1.0)
     }
 
     /// The step that the score asks for.
@@ -246,6 +254,10 @@ impl Likelihood<'_> {
         let mut step = solved(matrix, wanted)?;
         // No farther than the slopes can be trusted: half a bin or pulse, and factors of e.
         let most = [0.5 + 0.5 * self.response.pulse_sigma_bins, 1.0, 1.5, 0.5];
+        // Under a THRESHOLD bins say next to nothing of the background, which would hold back everything else.
+        if self.response.counting.threshold > 0 {
+            step[2] = step[2].clamp(-most[2], most[2]);
+        }
         let scale = step
             .iter()
             .zip(most)
@@ -284,6 +296,108 @@ impl Likelihood<'_> {
             .filter(|variance| *variance > 0.0)
             .map_or(f64::INFINITY, f64::sqrt)
     }
+}
+
+/// A search for the most likely light, between two steps.
+struct Climb {
+    light: EchoLight,
+    local: Local,
+    damping: f64,
+    rounds: usize,
+    /// What the step that was asked for promises, and what is close enough.
+    gain: f64,
+    close: f64,
+    has_converged: bool,
+    is_over: bool,
+}
+
+impl Climb {
+    fn new(light: EchoLight, local: Local) -> Self {
+        Climb {
+            light,
+            local,
+            damping: 0.0,
+            rounds: 0,
+            gain: 0.0,
+            close: 0.0,
+            has_converged: false,
+            is_over: false,
+        }
+    }
+
+    /// The light to look at next; `None` at the end.
+    fn next(&mut self, likelihood: &Likelihood<'_>, close: f64) -> Option<EchoLight> {
+        while !self.is_over && self.rounds < ROUNDS {
+            self.rounds += 1;
+            let Some(step) = likelihood.step(&self.light, &self.local, self.damping) else {
+                self.damping = f64::max(10.0 * self.damping, 1e-3);
+                continue;
+            };
+            let promised = step.iter().zip(self.local.score);
+            self.gain = promised.map(|(step, score)| step * score).sum();
+            self.close = close * (self.local.deviance / likelihood.freedom()).max(1.0);
+            if self.damping == 0.0 && self.gain < self.close {
+                self.has_converged = true;
+                self.is_over = true;
+                if close > CLOSE {
+                    self.local.deviance -= self.gain;
+                }
+                break;
+            }
+            return Some(likelihood.moved(&self.light, step));
+        }
+        None
+    }
+
+    /// Goes to a light, if it is more likely.
+    fn go_to(&mut self, light: EchoLight, there: Local) {
+        // As far as rounding lets it be told.
+        if there.deviance <= self.local.deviance + 1e-9 * (1.0 + self.local.deviance) {
+            let gained = self.local.deviance - there.deviance;
+            (self.light, self.local) = (light, there);
+            if self.gain < self.close && gained < self.close {
+                self.has_converged = true;
+                self.is_over = true;
+            }
+            // Where much less was gained than promised, steps overshoot to and fro.
+            self.damping = if gained < 0.3 * self.gain {
+                (3.0 * self.damping).max(0.3)
+            } else if self.damping > 1e-3 {
+                self.damping / 10.0
+            } else {
+                0.0
+            };
+        } else {
+            self.damping = f64::max(10.0 * self.damping, 1e-2);
+            self.is_over = self.damping > 1e9;
+        }
+    }
+
+    fn fit(self, likelihood: &Likelihood<'_>) -> Fit {
+        Fit {
+            light: self.light,
+            deviance: self.local.deviance,
+            freedom: likelihood.freedom(),
+            has_converged: self.has_converged,
+            bound_bins: likelihood.bound_bins(&self.local),
+        }
+    }
+}
+
+/// The ln likelihood that is missing at these chances.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn missing(counts: &[f64], chances: &[f64], cycles: f64) -> f64 {
+    let mut terms: SmallVec<[f64; MOST_BINS]> = SmallVec::from_elem(0.0, counts.len());
+    for ((term, &counts), &chance) in terms.iter_mut().zip(counts).zip(chances) {
+        let chance = chance.clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE);
+        let missed = cycles - counts;
+        let of_counts = counts * branchless::ln(counts / (cycles * chance));
+        let of_missed = missed * branchless::ln(missed / (cycles * (1.0 - chance)));
+        let [counted, uncounted] = [(counts, of_counts), (missed, of_missed)]
+            .map(|(part, share)| if part > 0.0 { share } else { 0.0 });
+        *term = counted + uncounted;
+    }
+    terms.iter().sum()
 }
 
 /// Makes parameter `i` of a symmetric matrix one that stays as it is.

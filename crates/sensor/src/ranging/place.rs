@@ -11,7 +11,7 @@
 //! places, each weighed by its likelihood under the best signal there, and the bound their standard deviation.
 
 use super::expected::EchoLight;
-use super::likelihood::{Fit, Likelihood};
+use super::likelihood::{Fit, Likelihood, ONLY_SIGNAL};
 use super::walk::OF_A_WIDTH;
 
 /// Standard deviation of a pulse most of which lies within a bin, bins.
@@ -85,15 +85,13 @@ pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit
         free: [place, signal, background, false],
         ..likelihood.clone()
     };
-    let with_depth = |light: &EchoLight, depth: f64| {
-        held.maximise(&EchoLight {
-            sigma_bins: libm::hypot(light.sigma_bins, depth),
-            ..*light
-        })
+    let with_depth = |light: &EchoLight, depth: f64| EchoLight {
+        sigma_bins: libm::hypot(light.sigma_bins, depth),
+        ..*light
     };
     let starts = narrow.iter().map(|fit| &fit.light);
     let deep = starts.flat_map(|light| DEPTHS.map(|depth| with_depth(light, depth)));
-    let deep: Vec<Fit> = deep.collect();
+    let deep = held.maximise_each(&deep.collect::<Vec<_>>());
     let is_wider = chosen.light.sigma_bins > first.light.sigma_bins;
     let wider = deep.iter().chain(is_wider.then_some(chosen));
     // Where these tell no place either, those of the pulse's own width reach as far.
@@ -123,7 +121,7 @@ pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit
 /// Places about a fit, each with the best signal there.
 fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
     let held = Likelihood {
-        free: [false, true, false, false],
+        free: ONLY_SIGNAL,
         ..likelihood.clone()
     };
     let own = fit.bound_bins.min(1.0 / PLACES);
@@ -138,7 +136,7 @@ fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
         let mut light = fit.light;
         for at in order {
             light.position_bins = fit.light.position_bins + offsets[at];
-            let near = held.near(&light);
+            let near = held.roughly_near(&light);
             light.signal = near.light.signal;
             deviances[at] = near.deviance;
             if near.deviance > fit.deviance + FAR {

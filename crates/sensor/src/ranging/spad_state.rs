@@ -25,6 +25,14 @@ pub(super) struct Dead {
     pub(super) crosstalk: f64,
 }
 
+impl Dead {
+    /// Whether a SPAD fires by light alone, at most once in a bin, and is ready a dead time later.
+    pub(super) fn is_plain(&self) -> bool {
+        let is_alone = self.afterpulses == 0.0 && self.crosstalk == 0.0;
+        is_alone && !self.paralysable && self.time_bins >= 1.0
+    }
+}
+
 /// The state of a SPAD, as chances.
 #[derive(Clone)]
 pub(super) struct Spad<'r, const K: usize> {
@@ -126,10 +134,7 @@ impl<'r, const K: usize> Spad<'r, K> {
             blinding: history(blinding),
             fired: Dual::ZERO,
             by_crosstalk: Dual::ZERO,
-            is_plain: dead >= 1.0
-                && !law.paralysable
-                && law.afterpulses == 0.0
-                && law.crosstalk == 0.0,
+            is_plain: law.is_plain(),
             parity: None,
             traps,
         }

@@ -213,11 +213,11 @@ impl WalkCorrection {
         if self.response.counting.threshold > 0 {
             return Ok(best);
         }
-        let mut fits = vec![wide.maximise(&best.light)];
+        let mut starts = vec![best.light];
         if best.bound_bins > WELL_KNOWN {
-            let deep = self.deep_start(wide, &best.light);
-            fits.extend(deep.map(|deep| wide.maximise(&deep)));
+            starts.extend(self.deep_start(wide, &best.light));
         }
+        let mut fits = wide.maximise_each(&starts);
         fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
         // A width that hardly explains more would only pull the place after it.
         let is_worth_it = |fit: &&Fit| fit.deviance + OF_A_WIDTH < best.deviance;
@@ -261,7 +261,8 @@ impl WalkCorrection {
             sigma_bins: self.response.pulse_sigma_bins.max(DEEP_BINS),
             ..all
         });
-        let judged = lights.map(|light| (likelihood.deviance(&light), light));
+        let lights: Vec<EchoLight> = lights.collect();
+        let judged = likelihood.deviances(&lights).into_iter().zip(lights);
         let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
         best.map(|(_, light)| light)
     }
@@ -363,14 +364,14 @@ impl WalkCorrection {
             free: IN_REGION,
             ..likelihood.clone()
         };
+        let starts = DARKER.map(|share| EchoLight {
+            background_per_bin: share * likelihood.most_background,
+            ..best.light
+        });
+        let near = held.near_each(&starts);
+        let lights: Vec<EchoLight> = near.iter().map(|fit| fit.light).collect();
         let mut fits = vec![best];
-        for share in DARKER {
-            let start = EchoLight {
-                background_per_bin: share * likelihood.most_background,
-                ..best.light
-            };
-            fits.push(likelihood.maximise(&held.near(&start).light));
-        }
+        fits.extend(likelihood.maximise_each(&lights));
         fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
         with_rivals(fits[0], &fits, likelihood)
     }

@@ -6,11 +6,14 @@
 //!
 //! Strong light leaves the rising edge and little else, so that a weaker echo here and a stronger one there may explain the same counts.
 
+use std::ops::Range;
+
 use super::{WalkCorrection, WalkLeft};
 use crate::chip::EventType;
-use crate::ranging::expected::{EchoLight, share_before};
+use crate::ranging::expected::EchoLight;
 use crate::ranging::likelihood::{BESIDE, Fit, Likelihood};
 use crate::ranging::peak::Peak;
+use crate::ranging::pulse::share_before;
 
 /// Ambiguity: another light whose deviance is larger by less than [`AS_GOOD`], at a place more than [`ELSEWHERE`]
 /// bounds away.
@@ -37,12 +40,14 @@ impl WalkCorrection {
         let has_threshold = self.response.counting.threshold > 0;
         let is_short = self.has_short_pulses();
         let edge_is_seen = |bin: usize| bin as f64 > 1.0 + sigma_bins;
-        let mut starts: Vec<(f64, EchoLight)> = Vec::new();
+        let mut lights: Vec<EchoLight> = Vec::new();
+        let mut of_signal: Vec<Range<usize>> = Vec::new();
         // Where light makes bins count less, too, each light has its own places.
         let (step, fits) = match edge {
             Some((bin, _)) if edge_is_seen(bin) && is_short => (0.1, 4),
             Some((bin, _)) if edge_is_seen(bin) && !has_threshold => (0.4, 2),
-            // With a THRESHOLD few bins count, and several lights may explain them.
+            // With a THRESHOLD few bins count, and several lights may explain them: with 8 fits for 24, one more depth of 512 was a hundredth of its bound beside.
+            Some(_) if has_threshold => (0.2, 8),
             Some(_) => (0.2, 24),
             None => (0.2, 8),
         };
@@ -73,19 +78,22 @@ impl WalkCorrection {
                     .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
                     .collect(),
             };
-            let judged = places
-                .into_iter()
-                .map(light)
-                .map(|light| (likelihood.deviance(&light), light));
-            starts.extend(judged.min_by(|a, b| a.0.total_cmp(&b.0)));
+            let first = lights.len();
+            lights.extend(places.into_iter().map(light));
+            of_signal.push(first..lights.len());
         }
+        let deviances = likelihood.deviances(&lights);
+        let judged = |at: usize| (deviances[at], lights[at]);
+        let best_of = |range: Range<usize>| range.map(judged).min_by(|a, b| a.0.total_cmp(&b.0));
+        let mut starts: Vec<(f64, EchoLight)> = of_signal.into_iter().filter_map(best_of).collect();
         if is_short {
             starts = least_of(&starts);
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut near: Vec<Fit> = Vec::new();
-        for (_, start) in starts.iter().take(fits) {
-            add_new(&mut near, likelihood.near(start));
+        let starts = starts.iter().take(fits).map(|(_, start)| *start);
+        for fit in likelihood.near_each(&starts.collect::<Vec<_>>()) {
+            add_new(&mut near, fit);
         }
         let least = near
             .iter()
@@ -93,9 +101,8 @@ impl WalkCorrection {
             .fold(f64::INFINITY, f64::min);
         near.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
         let may_win = |fit: &&Fit| has_threshold || fit.deviance < least + FAR;
-        let mut fits: Vec<Fit> = (near.iter().filter(may_win))
-            .map(|near| likelihood.refined(near))
-            .collect();
+        let near: Vec<Fit> = near.iter().filter(may_win).copied().collect();
+        let mut fits = likelihood.refined_each(&near);
         // Those that have converged first, then the most likely. Under a THRESHOLD the most likely may converge slowly.
         let is_behind = |fit: &Fit| !has_threshold && !fit.has_converged;
         fits.sort_by(|a, b| {

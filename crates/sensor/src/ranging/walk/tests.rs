@@ -3,7 +3,7 @@
 use super::many_starts::{add_new, quantile};
 use super::*;
 use crate::chip::SensorConfig;
-use crate::ranging::expected::share_before;
+use crate::ranging::pulse::share_before;
 use crate::units::Time;
 use proptest::prelude::*;
 
@@ -327,7 +327,7 @@ proptest! {
             let counts: Vec<f64> = counts.collect();
             let likelihood = likelihood(&walk, &counts);
             let bad = EchoLight { position_bins: position_bins + beside, background_per_bin: 0.1, ..echo };
-            let first = Fit { light: bad, deviance: likelihood.deviance(&bad), bound_bins: 0.01, ..fit() };
+            let first = Fit { light: bad, deviance: likelihood.deviances(&[bad])[0], bound_bins: 0.01, ..fit() };
             let found = walk.darker(&likelihood, first);
             if threshold == 0 {
                 prop_assert_eq!(found, first);
@@ -336,7 +336,7 @@ proptest! {
             let held = Likelihood { free: IN_REGION, ..likelihood.clone() };
             let others = [0.3, 0.1, 0.03, 0.01].map(|share| {
                 let start = EchoLight { background_per_bin: share * 0.1, ..bad };
-                likelihood.maximise(&held.near(&start).light)
+                likelihood.maximise(&held.near_each(&[start])[0].light)
             });
             let mut fits = vec![first];
             fits.extend(others);
