@@ -1,5 +1,5 @@
-//! What dim light costs the window engine: ns of processor time for a laser cycle of a macropixel, 16 000 laser cycles of 4800 CLK
-//! periods, one thread, the better of two runs. `cargo bench --bench dim` prints a line a light.
+//! What dim light costs the window engine, and some bright light beside it: ns of processor time for a laser cycle of a macropixel,
+//! 16 000 laser cycles of 4800 CLK periods, one thread, the better of two runs. `cargo bench --bench dim` prints a line a light.
 
 use cpu_time::ThreadTime;
 use guided_dtof::chip::{EventType, Exposure, SensorConfig, WindowLaw};
@@ -38,7 +38,7 @@ const fn case(name: &'static str, background_mhz: f64, signal: f64, echoes: i32)
     }
 }
 
-fn cases() -> [Case; 15] {
+fn cases() -> [Case; 21] {
     let secondaries = 0.01;
     [
         case("8 Mcounts/s, 0.1", 8.0, 0.1, 1),
@@ -62,6 +62,24 @@ fn cases() -> [Case; 15] {
                 2.0,
                 2,
             )
+        },
+        Case {
+            secondaries,
+            ..case("8 Mcounts/s, 0.1, 1 % secondaries", 8.0, 0.1, 1)
+        },
+        Case {
+            secondaries,
+            ..case("26 Mcounts/s, 0.1, 1 % secondaries", 26.0, 0.1, 1)
+        },
+        Case {
+            secondaries,
+            ..case("26 Mcounts/s, 1, 1 % secondaries", 26.0, 1.0, 1)
+        },
+        case("26 Mcounts/s, 0.5", 26.0, 0.5, 1),
+        case("400 Mcounts/s, 0.1", 400.0, 0.1, 1),
+        Case {
+            secondaries,
+            ..case("400 Mcounts/s, 0.1, 1 % secondaries", 400.0, 0.1, 1)
         },
         Case {
             side: 2,
