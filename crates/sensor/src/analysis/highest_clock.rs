@@ -144,6 +144,6 @@ mod tests {
         };
         let found = highest_clock(&config, &Silicon::of(&config), (0, 0)).unwrap();
         assert!(found.clk_hz > 500e6, "{found:?}");
-        assert!(found.limit.unwrap().check.contains("COUNTER_CLK"));
+        assert!(found.limit.unwrap().check.contains("blocking"));
     }
 }
