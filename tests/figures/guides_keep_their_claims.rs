@@ -35,13 +35,21 @@ fn the_table_of_the_book_is_what_guides_do() {
     }
 }
 
-/// At 3 standard deviations shares are within a hundredth of what is promised.
+/// Macropixels of the table with a target: some 3000 in each of at least four frames.
+const TARGETS: f64 = 12_000.0;
+
+/// At 3 standard deviations shares are within a hundredth of what is promised, and what chance does to few estimates.
 #[test]
 fn claims_are_kept_at_three_sigma() {
     for (guide, scene) in GUIDES.iter().flat_map(|g| SCENES.map(|s| (*g, s))) {
-        let &[_, _, _, _, three] = &numbers(&in_the_book(guide, scene))[..] else {
-            panic!("{guide} {scene}");
+        let (estimated, three) = match numbers(&in_the_book(guide, scene))[..] {
+            [estimated, _, _, _, three] => (estimated, three),
+            // Nothing has an estimate.
+            [0.0] => continue,
+            _ => panic!("{guide} {scene}"),
         };
-        assert!((three - PROMISED).abs() <= 0.01, "{guide} {scene}: {three}");
+        let deviation = (PROMISED * (1.0 - PROMISED) / (estimated * TARGETS)).sqrt();
+        let most = 0.01 + 3.0 * deviation;
+        assert!((three - PROMISED).abs() <= most, "{guide} {scene}: {three}");
     }
 }
