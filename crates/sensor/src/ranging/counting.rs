@@ -75,8 +75,8 @@ impl Counting {
         fired.chain(value, by_fired) + children
     }
 
-    /// The chance that more SPADs than THRESHOLD fire, each with chance `fired`: where one more than it has fired, so many did before, and the
-    /// others among those did not.
+    /// The chance that more SPADs than THRESHOLD fire, each with chance `fired`. SPADs have an order here: the sum is over the SPAD that is
+    /// number THRESHOLD + 1 to fire.
     fn chance_of_more<const K: usize>(&self, fired: Dual<K>) -> Dual<K> {
         if self.threshold >= self.spads {
             return Dual::ZERO;

@@ -97,8 +97,8 @@ const MOST_BOUND_BINS: f64 = 0.25;
 /// 4.5·10³ and 10⁴ photons up to 69 were beyond five bounds, at 900 none.
 const MOST_UNDER_THRESHOLD: f64 = 60.0;
 
-/// Echoes of deep surfaces are no Gaussian pulses: their mean is known to this part of their spread. Chosen: with 0.3, errors of 45 frames
-/// keep five bounds where they did not without.
+/// Echoes of deep surfaces are no Gaussian pulses: their mean is known to this part of their spread. Chosen: of some 80 000 depths of 45 frames 80
+/// are beyond five bounds, with 0.2 83 are.
 const OF_SHAPE: f64 = 0.3;
 
 /// The same in light that fires every SPAD in every laser cycle: its counts show the front of an echo, and a surface ends where a Gaussian

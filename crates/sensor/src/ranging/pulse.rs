@@ -47,7 +47,7 @@ impl Pulse {
         }
     }
 
-    /// Times so many standard deviations before and after its centre; late avalanches come after those.
+    /// From `before` standard deviations before its centre to `after` ones behind it, and its late avalanches.
     pub(super) fn within(&self, before: f64, after: f64) -> [f64; 2] {
         let late = self.tail.map_or(0.0, |tail| TAIL_REACH * tail.bins);
         let ends = self.centre + after * self.sigma + late;
