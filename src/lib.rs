@@ -34,6 +34,7 @@
 //! | [`theory`] | detection probability, precision, partial histograms, design, significance |
 //! | [`ranging`] | depth from histograms |
 //! | [`report`] | pictures, arrays, tables |
+//! | [`photons`] | SPAD pulses of a scene for any chip, as files |
 //! | [`system`] | one guided frame, end to end, and drives of many |
 //! | [`request`] | what a user asks for, read and checked |
 //! | `demo` | the demonstrator of the thesis before its scenes |
@@ -47,6 +48,7 @@
 pub mod cli;
 mod demo;
 mod page;
+pub mod photons;
 pub mod propose;
 pub mod report;
 pub mod reproduce;

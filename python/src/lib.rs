@@ -17,6 +17,7 @@ mod failure;
 mod frame;
 mod guide;
 mod light;
+mod photons;
 mod propose;
 mod replay;
 mod scene;
@@ -55,6 +56,8 @@ mod _gdtof {
     use super::frame::frame;
     #[pymodule_export]
     use super::light::expose;
+    #[pymodule_export]
+    use super::photons::{light, photons};
     #[pymodule_export]
     use super::replay::replay;
     #[pymodule_export]

@@ -1,5 +1,6 @@
 //! Options about the exposure that `gdtof frame` and `gdtof drive` share.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -90,6 +91,38 @@ pub(super) fn pixel(
             sensor.cols - 1
         ),
         None => format!("{text:?} is not a macropixel; give row,col such as 10,20"),
+    };
+    Err(InputError::new(option, message))
+}
+
+/// Rows and columns of the macropixels that an option names as row,col, each a number or a range such as 8-11, of an array of these
+/// rows and columns.
+///
+/// # Errors
+/// When the array has no such macropixels.
+pub(super) fn region(
+    option: &str,
+    text: &str,
+    (rows, cols): (usize, usize),
+) -> Result<[RangeInclusive<usize>; 2], InputError> {
+    let range = |text: &str| {
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        let (first, last) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
+        (first <= last).then_some(first..=last)
+    };
+    let region = text
+        .split_once(',')
+        .and_then(|(row, col)| Some([range(row)?, range(col)?]));
+    let message = match region {
+        Some([row, col]) if *row.end() < rows && *col.end() < cols => return Ok([row, col]),
+        Some(_) => format!(
+            "macropixel {text} is outside the {rows}x{cols} array; give rows 0 to {} and columns 0 to {}",
+            rows - 1,
+            cols - 1
+        ),
+        None => format!(
+            "{text:?} is not a macropixel; give row,col such as 10,20, or ranges such as 8-11,20-23"
+        ),
     };
     Err(InputError::new(option, message))
 }

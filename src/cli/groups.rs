@@ -6,7 +6,7 @@ use clap::Command;
 
 /// Every command, in the order in which a newcomer needs them.
 const GROUPS: [(&str, &[&str]); 6] = [
-    ("Take frames", &["frame", "drive", "demo"]),
+    ("Take frames", &["frame", "drive", "demo", "photons"]),
     (
         "Look at results",
         &["page", "wave", "range", "stereo", "export"],

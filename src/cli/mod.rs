@@ -14,6 +14,7 @@ mod groups;
 mod mapped;
 mod page;
 mod pareto;
+mod photons;
 mod power;
 mod propose;
 mod quality;
@@ -69,6 +70,8 @@ enum Command {
     Drive(drive::DriveArgs),
     /// Repeat an experiment of the thesis's demonstrator, and say whether it finds the target.
     Demo(demo::DemoArgs),
+    /// Write the SPAD pulses of a scene for any chip, or of a frame, as CSV, text, memory words, VCD or NumPy.
+    Photons(photons::PhotonsArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
     /// Compare the thesis's published figures with what the model computes.
@@ -159,6 +162,7 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::Page(args) => page::run(&args),
         Command::Wave(args) => wave::run(&args),
+        Command::Photons(args) => photons::run(args),
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),

@@ -160,7 +160,7 @@ impl FrameRequest {
 }
 
 /// The sensor in the scene's lidar: at its temperature, unless it has one of its own.
-fn as_warm_as(scene: &Scene, sensor: Sensor) -> Result<Sensor, InputError> {
+pub(super) fn as_warm_as(scene: &Scene, sensor: Sensor) -> Result<Sensor, InputError> {
     let (None, Some(junction_c)) = (sensor.temperature_c, scene.lidar.junction_c()) else {
         return Ok(sensor);
     };

@@ -11,6 +11,7 @@
 
 mod frame;
 mod frame_files;
+mod light;
 mod sources;
 mod spelling;
 mod wording;
@@ -18,6 +19,7 @@ mod wording;
 pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate, read_calibration};
 pub use self::frame_files::{Exposed, FrameConfiguration, FrameReport, write_frame};
 pub(crate) use self::frame_files::{eye_safety_of, frame_s, variance_left_out_of};
+pub use self::light::LightRequest;
 pub use self::sources::Sources;
 pub(crate) use self::sources::{ReadAs, refuse_other_kind};
 pub use self::spelling::Spelling;

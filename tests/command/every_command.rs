@@ -20,6 +20,7 @@ pub const RUNS: &[(&str, &str, bool)] = &[
         "--rows 2 --cols 2 --laser-cycles 2 --frames 1",
         false,
     ),
+    ("photons", "--rows 2 --cols 2 --laser-cycles 2", false),
     ("demo", "glass --calibration-step-ps 200", false),
     (
         "replay",

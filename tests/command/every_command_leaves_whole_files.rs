@@ -19,9 +19,12 @@ const WITHOUT_FILES: [&str; 7] = [
 ];
 
 /// Words that let a command write, or write more, beside those that let it run.
-const MORE: [(&str, &str); 9] = [
+const MORE: [(&str, &str); 12] = [
     ("frame", "--page --probe 0,0"),
     ("drive", "--mcap"),
+    ("photons", "--format vcd"),
+    ("photons", "--format memh"),
+    ("photons", "--format npy"),
     ("replay", "--out h.npy"),
     (
         "replay",

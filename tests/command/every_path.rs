@@ -71,7 +71,8 @@ fn besides(command: &str, argument: &str) -> &'static str {
 pub fn with(command: &str, argument: &Arg, value: &str) -> Vec<String> {
     let id = argument.get_id().as_str();
     let mut all = words(command);
-    if (command, id) == ("reproduce", "liberty") {
+    // Its other words are not for what was taken.
+    if [("reproduce", "liberty"), ("photons", "frame")].contains(&(command, id)) {
         all.truncate(1);
     }
     all.push("--quiet".into());

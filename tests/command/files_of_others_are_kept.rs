@@ -75,6 +75,8 @@ fn each_command_has_a_folder_of_its_own_and_leaves_that_of_others() {
         PARETO,
         "drive --rows 2 --cols 2 --frames 1 --laser-cycles 3",
         "demo glass",
+        "photons --rows 1 --cols 1 --laser-cycles 2",
+        "photons --frame out/frame.json",
         "sweep study.toml",
         "sweep study.toml --shard 1/2",
         "man",
@@ -214,6 +216,13 @@ fn no_input_is_replaced_whatever_its_name() {
     for (words, says) in cases {
         refused(here, &words, says);
     }
+    // A set that a run reads from is not replaced by another of its command.
+    done(here, "photons --frame fr/frame.json --out p");
+    refused(
+        here,
+        "photons --sensor p/sensor.toml --laser-cycles 3 --out p",
+        "p/sensor.toml: is read by this run",
+    );
     // Other names are as good as ever, and what an earlier run wrote is replaced.
     for _ in 0..2 {
         done(here, &format!("{replay} --out counts.csv"));

@@ -94,6 +94,33 @@ fn a_sweep_needs_16_bytes_a_point_and_survives_kills() {
     }
 }
 
+/// In one file and in one for each macropixel, whether pulses are drawn in groups of laser cycles or one after the other.
+#[test]
+fn photons_need_the_same_memory_for_any_number_of_laser_cycles() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, light, few, many) in [
+        ("dim", "--scene night --fov-deg 0.5", "20000", "2000000"),
+        ("bright", "--fov-deg 0.2 --spads 4", "2000", "60000"),
+    ] {
+        for format in ["csv", "txt", "memh --word-ns 100", "npy", "vcd --no-clk"] {
+            let mut first_mb = None;
+            for cycles in [few, many] {
+                let words = format!(
+                    "photons {light} --period-ns 400 --laser-cycles {cycles} --format {format} --out {name}"
+                );
+                let words: Vec<&str> = words.split(' ').collect();
+                let (peak_mb, is_done) = run(dir.path(), &words, None);
+                assert!(is_done, "{words:?}");
+                println!("{cycles} laser cycles as {format}, {name}: peak {peak_mb:.1} MB");
+                assert!(
+                    peak_mb < *first_mb.get_or_insert(peak_mb) + 20.0,
+                    "{words:?}: {peak_mb} MB"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn a_drive_needs_the_same_memory_for_any_number_of_frames() {
     let dir = tempfile::tempdir().unwrap();

@@ -35,6 +35,7 @@ mod mismatch_replays;
 #[cfg(unix)]
 mod no_file_blocks_a_command;
 mod one_window_for_all;
+mod photons_reach_any_chip;
 mod probes_keep_their_first_hits;
 #[cfg(unix)]
 mod progress_shows_on_a_terminal;

@@ -32,6 +32,7 @@ fn long_runs_say_how_far_they_are() {
             "--rows 48 --cols 48 --laser-cycles 3000 --out f",
             "exposing",
         ),
+        ("photons", "--laser-cycles 100", "drawing"),
         ("page", "", "making the page"),
         ("timing", "", "analysing"),
         ("reproduce", "--liberty example.lib", "measuring"),

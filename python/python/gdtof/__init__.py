@@ -14,6 +14,7 @@ from ._arrays import Reason
 from ._frame import Drive, DriveFrame, Frame, Maps, drive, frame
 from ._gdtof import Guide, Problem, Scene, Sensor, __version__
 from ._histograms import Exposed, Ranged, Replayed, expose, range, replay
+from ._light import Light, Photons, light
 from ._sweep import Swept, sweep
 from ._timing import Timing, bin_edges, starts_for, timing, windows
 from .errors import Error, InputError, SimulationError
@@ -27,7 +28,9 @@ __all__ = [
     "Frame",
     "Guide",
     "InputError",
+    "Light",
     "Maps",
+    "Photons",
     "Problem",
     "Ranged",
     "Reason",
@@ -44,6 +47,7 @@ __all__ = [
     "errors",
     "expose",
     "frame",
+    "light",
     "range",
     "read_vcd",
     "replay",

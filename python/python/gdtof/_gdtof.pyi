@@ -19,6 +19,8 @@ __all__ = [
     "confidence",
     "expose",
     "frame",
+    "light",
+    "photons",
     "range_counts",
     "replay",
     "starts_for",
@@ -189,6 +191,19 @@ def replay(
     periods: tuple[int, int],
     engine: str,
     waves: str | PathLike[str] | None,
+    progress: Callable[[int], object] | None,
+) -> dict[str, Any]: ...
+def light(
+    sensor: Sensor | None, scene: Scene | None, spads: int | None, fov_deg: float | None
+) -> dict[str, Any]: ...
+def photons(
+    sensor: Sensor | None,
+    scene: Scene | None,
+    spads: int | None,
+    fov_deg: float | None,
+    period_ns: float | None,
+    periods: tuple[int, int],
+    seed: int,
     progress: Callable[[int], object] | None,
 ) -> dict[str, Any]: ...
 def range_counts(

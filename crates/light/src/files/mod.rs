@@ -42,7 +42,9 @@ pub use journal::{Journal, JournalReader, is_journal, journal_line};
 pub use misfit::Misfit;
 pub use misfit::in_plain_words;
 pub(crate) use misfit::{is_no_word, unknown_word};
-pub use npy::{Element, NpyHead, Number, write_npy, write_npy_elements, write_npy_head};
+pub use npy::{
+    Element, NpyHead, Number, write_npy, write_npy_elements, write_npy_head, write_npy_records_head,
+};
 pub use output::{OutputFile, create_folder};
 pub use raster::Raster;
 pub use result_set::{MANIFEST, ManifestFile, ResultSet, file_hash};

@@ -77,10 +77,16 @@ pub fn write_npy_head<T: Element>(
 ) -> io::Result<()> {
     let axes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let descr = T::DESCR;
-    let mut head = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({axes}), }}");
+    let head = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({axes}), }}");
+    let length = head.len();
+    write_head(out, head, length)
+}
+
+/// Writes a head as long as one of `least` characters needs to be.
+fn write_head(out: &mut (impl Write + ?Sized), mut head: String, least: usize) -> io::Result<()> {
     // Elements begin at a multiple of 64 bytes.
     let before = MAGIC.len() + 4;
-    while !(before + head.len() + 1).is_multiple_of(64) {
+    while head.len() < least || !(before + head.len() + 1).is_multiple_of(64) {
         head.push(' ');
     }
     head.push('\n');
@@ -88,6 +94,26 @@ pub fn write_npy_head<T: Element>(
     out.write_all(&[1, 0])?;
     out.write_all(&(head.len() as u16).to_le_bytes())?;
     out.write_all(head.as_bytes())
+}
+
+/// Writes the head of a list of records with these fields and their types, as NumPy spells them. It has the same length for any number of
+/// records, so that it can be written again when they have been counted.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_npy_records_head(
+    out: &mut (impl Write + ?Sized),
+    fields: &[(&str, &str)],
+    records: u64,
+) -> io::Result<()> {
+    let fields: Vec<String> = (fields.iter())
+        .map(|(name, descr)| format!("('{name}', '{descr}')"))
+        .collect();
+    let fields = fields.join(", ");
+    let head = |records: u64| {
+        format!("{{'descr': [{fields}], 'fortran_order': False, 'shape': ({records},), }}")
+    };
+    write_head(out, head(records), head(u64::MAX).len())
 }
 
 /// Writes elements, without a head.

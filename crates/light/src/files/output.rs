@@ -66,6 +66,19 @@ impl OutputFile {
         Self::prepared(path, fill)?.commit()
     }
 
+    /// Writes a whole file through `fill`, which may go back in it.
+    ///
+    /// # Errors
+    /// As [`OutputFile::write_with`].
+    pub fn create_with(
+        path: &Path,
+        fill: impl FnOnce(&mut Self) -> io::Result<()>,
+    ) -> Result<(), InputError> {
+        let mut file = Self::create(path)?;
+        fill(&mut file).map_err(|e| InputError::unwritable(path, &e))?;
+        file.commit()
+    }
+
     /// Writes a whole file through `fill`, for the caller to commit: of several files, all appear or none.
     ///
     /// # Errors

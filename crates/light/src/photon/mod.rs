@@ -16,6 +16,7 @@ mod random;
 pub mod solar;
 mod spad;
 mod spad_grid;
+mod spad_layout;
 mod stream;
 mod tail;
 
@@ -24,7 +25,7 @@ pub use budget::{Convention, PhotonBudget, Spot};
 pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
 pub use light::{
-    Echo, LightError, OtherLaser, PixelLight, Profile, PulseTrain, Segment, SpadSpread,
+    Echo, LightError, MeanLight, OtherLaser, PixelLight, Profile, PulseTrain, Segment, SpadSpread,
 };
 pub use mixture::{DEEP, Glint, MERGED_ERROR, NEGLIGIBLE, merged};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
@@ -37,6 +38,7 @@ pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, MOST_SPREAD, Photon, SpadEvent, SpadModel,
 };
 pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
+pub use spad_layout::SpadLayout;
 pub use stream::{
     Background, Draw, GROUP, Group, LightParts, ListedEchoes, NEVER_FS, OrderedEchoes, PER_BLOCK,
     PLACE_BITS, PhotonStream, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE, TIME_BITS,

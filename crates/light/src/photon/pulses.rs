@@ -1,5 +1,7 @@
 //! All avalanches of a macropixel in an exposure, in their order: the whole stream and what its SPADs make of it.
 
+use std::ops::ControlFlow;
+
 use super::light::PixelLight;
 use super::spad::{Photon, SpadEvent};
 use super::stream::{ByCycle, Draw, ListedEchoes, PhotonStream, PixelStream, SPAD_SHIFT};
@@ -33,7 +35,20 @@ impl PhotonStream {
         &self,
         pixel: u32,
         light: &PixelLight,
-        pulses: impl FnMut(&[SpadEvent]),
+        mut pulses: impl FnMut(&[SpadEvent]),
+    ) -> PixelPhotons {
+        self.pixel_pulses_while(pixel, light, |some| {
+            pulses(some);
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// As [`PhotonStream::pixel_pulses`], until `pulses` breaks: what comes after that is not drawn.
+    pub fn pixel_pulses_while(
+        &self,
+        pixel: u32,
+        light: &PixelLight,
+        pulses: impl FnMut(&[SpadEvent]) -> ControlFlow<()>,
     ) -> PixelPhotons {
         let parts = self.parts(pixel, light);
         match parts[0].is_bright {
@@ -45,7 +60,7 @@ impl PhotonStream {
     fn dim_pulses(
         &self,
         parts: &[PixelStream<'_>],
-        mut pulses: impl FnMut(&[SpadEvent]),
+        mut pulses: impl FnMut(&[SpadEvent]) -> ControlFlow<()>,
     ) -> PixelPhotons {
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
@@ -96,7 +111,9 @@ impl PhotonStream {
             debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
             photons.drain(..now);
             drawn += now as u64;
-            pulses(&edges);
+            if pulses(&edges).is_break() {
+                break;
+            }
         }
         PixelPhotons {
             events: Vec::new(),
@@ -108,7 +125,7 @@ impl PhotonStream {
     fn bright_pulses(
         &self,
         parts: &[PixelStream<'_>],
-        mut pulses: impl FnMut(&[SpadEvent]),
+        mut pulses: impl FnMut(&[SpadEvent]) -> ControlFlow<()>,
     ) -> PixelPhotons {
         let config = self.config();
         let longest_dead_time = config.spads.longest_dead_time();
@@ -153,7 +170,9 @@ impl PhotonStream {
             photons.drain(..now);
             drawn += now as u64;
             echoes.forget_before(until);
-            pulses(&edges);
+            if pulses(&edges).is_break() {
+                break;
+            }
         }
         PixelPhotons {
             events: Vec::new(),

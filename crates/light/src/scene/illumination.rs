@@ -12,7 +12,8 @@ use super::stray_light::with_stray_light;
 use super::truth::{Before, GroundTruth};
 use super::view::{Glimpse, View};
 use crate::photon::{
-    CROSSTALK_DELAY, Echo, Glint, PhotonBudget, PixelLight, PulseTrain, SpadModel, merged,
+    CROSSTALK_DELAY, Echo, Glint, PhotonBudget, PixelLight, PulseTrain, SpadLayout, SpadModel,
+    merged,
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 use crate::units::TimeOfFlight;
@@ -86,6 +87,31 @@ impl Scene {
         }
         let lights = (0..truth.views.len()).map(|pixel| timeline(&seen, pixel));
         self.on_own_spads(lights.collect(), spads)
+    }
+
+    /// As [`Scene::light_during`], on any number of SPADs: `spads` is the model of the layout's grid. Crosstalk between macropixels is
+    /// that of the grid's sides.
+    ///
+    /// # Panics
+    /// When `spads` has another grid than the layout.
+    pub fn light_on_layout(
+        &self,
+        truth: &GroundTruth,
+        (spads, layout): (&SpadModel, SpadLayout),
+        laser_cycles: u32,
+        cycle_s: f64,
+    ) -> Vec<PixelLight> {
+        assert_eq!(spads.grid, layout.grid());
+        let lights = self.light_during(truth, spads, laser_cycles, cycle_s);
+        if layout.is_full() {
+            return lights;
+        }
+        let own = |(pixel, light): (usize, PixelLight)| {
+            let spread = self.spad_spread(pixel as u32, layout.spads());
+            let lit = layout.lit(light, spread.as_ref());
+            lit.expect("as many SPADs as the layout has")
+        };
+        lights.into_iter().enumerate().map(own).collect()
     }
 
     /// Laser cycles in each of which the scene may be taken to stand still.

@@ -114,11 +114,14 @@ pub(super) fn refuse_other_spads(
 /// Photons of an echo that are held in memory at most: with those of 16 laser cycles 0.4 GB on each thread.
 const MOST_ECHO_PHOTONS: f64 = 1e6;
 
-/// Refuses echoes that do not fit into memory.
-fn refuse_floods(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
-    let lit = pixels
-        .iter()
-        .filter_map(|pixel| Some((pixel.number, pixel.light.as_ref()?)));
+/// Refuses echoes that do not fit into memory, on macropixels with these numbers.
+///
+/// # Errors
+/// [`EngineError::Flooded`].
+pub fn refuse_floods<'a>(
+    stream: &PhotonStream,
+    lit: impl Iterator<Item = (u32, &'a PixelLight)>,
+) -> Result<(), EngineError> {
     // Most macropixels have fewer, and their parts need no look.
     let flooded = lit.filter(|(_, light)| light.signal_per_cycle() > MOST_ECHO_PHOTONS);
     for (number, light) in flooded {
@@ -136,7 +139,10 @@ fn refuse_floods(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), Engin
 }
 
 fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
-    refuse_floods(stream, pixels)?;
+    let lit = pixels
+        .iter()
+        .filter_map(|pixel| Some((pixel.number, pixel.light.as_ref()?)));
+    refuse_floods(stream, lit)?;
     let config = stream.config();
     let spads = stream.spads() as f64;
     let most_hz = BLINDING / config.spads.dead_time.as_s();

@@ -33,7 +33,9 @@ pub use cancelling::{Cancelling, cancelled};
 pub use cohort::{Cohort, CohortOptions, variance_left_out};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use error::{EngineError, NotModelled};
-pub use exposing::{Answer, expose, expose_without_skipping, full_stream, stream_config};
+pub use exposing::{
+    Answer, expose, expose_without_skipping, full_stream, refuse_floods, stream_config,
+};
 pub use gate::{Gate, GateSimulation};
 pub use histograms::Histograms;
 pub use lanes::LaneSimulation;

@@ -22,12 +22,14 @@ pub use echo::{Echo, OtherLaser, PulseTrain};
 pub use error::LightError;
 use error::is_amount;
 pub(super) use layer::Layer;
+pub use mean::MeanLight;
 pub use profile::Profile;
 pub use spad_spread::SpadSpread;
 
 mod echo;
 mod error;
 mod layer;
+mod mean;
 mod profile;
 mod spad_spread;
 

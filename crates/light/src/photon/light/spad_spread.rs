@@ -47,6 +47,30 @@ impl SpadSpread {
         self.efficiency.len()
     }
 
+    /// The factor of every SPAD.
+    pub(in crate::photon) fn factors(&self) -> Vec<f64> {
+        let factors = self.efficiency.iter();
+        factors.map(|share| share * self.greatest_factor).collect()
+    }
+
+    /// Dark counts of every SPAD, per second.
+    pub(in crate::photon) fn dark_hz(&self) -> Vec<f64> {
+        let rates_hz = self.dark.iter();
+        rates_hz
+            .map(|share| share * self.greatest_dark_hz)
+            .collect()
+    }
+
+    /// The mean of all factors.
+    pub(super) fn mean_factor(&self) -> f64 {
+        self.factors().iter().sum::<f64>() / self.spads() as f64
+    }
+
+    /// Dark counts of all SPADs, per second.
+    pub(super) fn total_dark_hz(&self) -> f64 {
+        self.dark_hz().iter().sum()
+    }
+
     pub(super) fn dark_counts(&self) -> Layer<'_> {
         Layer {
             by_spad: Some(&self.dark),

@@ -139,6 +139,10 @@ const BRIGHT_SIGNAL: f64 = 8.0;
 /// much as by the background above.
 const BRIGHT_BLIND_SHARE: f64 = 0.08;
 
+/// And where a laser cycle has as many background photons: a group of 2048 laser cycles would hold 4 million photons and more. At
+/// [`BRIGHT_BACKGROUND_HZ`] these are laser cycles of 12.8 µs.
+const BRIGHT_CYCLE: f64 = 2048.0;
+
 /// What all macropixels of an exposure share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StreamConfig {
@@ -206,5 +210,6 @@ impl StreamConfig {
         background_hz > BRIGHT_BACKGROUND_HZ
             || light.brightest_echo() > BRIGHT_SIGNAL
             || blind > BRIGHT_BLIND_SHARE
+            || background_hz * self.cycle_s() > BRIGHT_CYCLE
     }
 }
