@@ -52,7 +52,7 @@ def test_laser_cycles_have_their_period() -> None:
 
 
 def test_rates_are_those_of_the_light() -> None:
-    dim = gdtof.Scene("street", {"light.illuminance_klux": 0.5, "lidar.pulse_energy_uj": 0.1})
+    dim = gdtof.Scene("street", {"light.illuminance_klux": 0.5, "lidar.pulse_energy_uj": 0.1, "lidar.fov_deg": 1.5})
     light = gdtof.light(dim, gdtof.Sensor(rows=4, cols=4), spads=64)
     photons = light.photons(1000, 5000)
     counts = np.bincount(photons.pixel, minlength=16).reshape(4, 4)

@@ -81,7 +81,7 @@ impl<'a, W: Write> Vcd<'a, W> {
             source,
             stamp: Some(Time::ZERO),
             stop: 1,
-            clk: has_clk.then(|| Clk {
+            clk: has_clk.then_some(Clk {
                 clock: source.exposure.clk,
                 phase: source.exposure.clk_phase,
                 next: 0,

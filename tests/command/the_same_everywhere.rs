@@ -12,7 +12,7 @@ use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 
 /// Name (and folder of results), arguments, and files that are compared.
-const RUNS: [(&str, &str, &[&str]); 11] = [
+const RUNS: [(&str, &str, &[&str]); 10] = [
     (
         "window",
         "frame --rows 8 --cols 8 --probe 2,1",
@@ -47,11 +47,6 @@ const RUNS: [(&str, &str, &[&str]); 11] = [
         "drive",
         "drive --rows 4 --cols 6 --frames 3 --guide stereo --guide kalman",
         &["histograms.npy", "guide.npy", "depth.npy"],
-    ),
-    (
-        "photons",
-        "photons --rows 4 --cols 4 --period-ns 500 --spads 9",
-        &["photons.csv", "light.csv"],
     ),
     ("engines", "sweep engines.toml", &["results.csv"]),
     ("guides", "sweep guides.toml", &["results.csv"]),
