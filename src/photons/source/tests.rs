@@ -3,9 +3,13 @@ use crate::photon::SpadModel;
 
 /// Macropixels of the street in few laser cycles.
 fn street(exposure: impl FnOnce(LitExposure) -> LitExposure) -> LightSource {
+    lit_street(&Scene::outdoor(), exposure)
+}
+
+fn lit_street(scene: &Scene, exposure: impl FnOnce(LitExposure) -> LitExposure) -> LightSource {
     let sensor = Sensor::default();
     let lit = LitExposure::of_sensor(&sensor, (520, 150), 4);
-    LightSource::of_scene(&Scene::outdoor(), (6, 6), &exposure(lit)).unwrap()
+    LightSource::of_scene(scene, (6, 6), &exposure(lit)).unwrap()
 }
 
 fn all(source: &LightSource, most_bytes: f64) -> (Vec<(u32, SpadEvent)>, PulseTotals) {
@@ -61,8 +65,11 @@ fn the_first_failure_ends_it() {
 /// Photons of SPADs that are nearly never blind, against the Poisson means that the facts say.
 #[test]
 fn rates_are_those_of_the_facts() {
+    let mut dim = Scene::outdoor();
+    dim.light.illuminance_klux = 0.1;
+    dim.lidar.pulse_energy_uj = 0.5;
     for spads in [1, 7, 16, 64] {
-        let source = street(|lit| {
+        let source = lit_street(&dim, |lit| {
             let lit = lit.with_spads(spads).unwrap();
             LitExposure {
                 clock: Frequency::from_period(Time::from_ns(2_000)).unwrap(),
@@ -95,10 +102,10 @@ fn rates_are_those_of_the_facts() {
                 ControlFlow::Continue(())
             });
             deviations.push((pulses - mean) / mean.sqrt());
-            if facts.signal > 1.0 {
+            if facts.signal > 0.25 {
                 // Within five standard deviations of the laser pulse there are few others.
                 assert!(
-                    near > 0.5 * facts.signal * 400.0,
+                    near > 0.2 * facts.signal * 400.0,
                     "{pixel}: {near} {facts:?}"
                 );
             }
@@ -118,6 +125,7 @@ fn rates_are_those_of_the_facts() {
 fn an_echo_later_than_several_laser_cycles_is_there() {
     let mut scene = Scene::outdoor();
     scene.light.illuminance_klux = 0.0;
+    scene.lidar.pulse_energy_uj = 0.01;
     let lit = LitExposure {
         clock: Frequency::from_period(Time::from_ns(40)).unwrap(),
         periods: 1,
