@@ -136,10 +136,9 @@ fn replay_of_a_frame_s_photons_gives_its_histograms() {
             "--rows 4 --cols 5 --laser-cycles 130 --probe none --set scene.lidar.fov_deg=1.5";
         done(
             here,
-            &format!("frame {size} --out {name} {more}")
+            format!("frame {size} --out {name} {more}")
                 .replace("  ", " ")
-                .trim()
-                .to_owned(),
+                .trim(),
         );
         let printed = done(
             here,
