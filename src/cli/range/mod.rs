@@ -1,6 +1,7 @@
 //! `gdtof range`: depths from histograms that the user has.
 
 mod args;
+mod counts;
 mod frame;
 mod tmf8820;
 
@@ -14,25 +15,36 @@ use crate::files::InputError;
 /// # Errors
 /// Bad input, files that cannot be written.
 pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
-    let of_frames = [
-        ("--frame", args.frame.is_some()),
-        ("--false-alarm-rate", args.false_alarm_rate.is_some()),
-        ("--no-walk-correction", args.no_walk_correction),
+    use Format::{Counts, Frame, Tmf8820};
+    // What each option is for.
+    let options: [(&str, bool, &[Format]); 11] = [
+        ("--fit", args.fit.is_some(), &[Tmf8820]),
+        ("--save-calibration", args.save_calibration.is_some(), &[Tmf8820]),
+        ("--calibration", args.calibration.is_some(), &[Tmf8820, Frame]),
+        ("--frame", args.frame.is_some(), &[Frame]),
+        ("--false-alarm-rate", args.false_alarm_rate.is_some(), &[Frame, Counts]),
+        ("--no-walk-correction", args.no_walk_correction, &[Frame, Counts]),
+        ("--bin-width-ns", args.bin_width_ns.is_some(), &[Counts]),
+        ("--start-ns", args.start_ns.is_some(), &[Counts]),
+        ("--laser-cycles", args.laser_cycles.is_some(), &[Counts]),
+        ("--pulse-fwhm-ns", args.pulse_fwhm_ns.is_some(), &[Counts]),
+        ("--counts", args.counts.is_some(), &[Counts]),
     ];
-    let of_captures = [
-        ("--fit", args.fit.is_some()),
-        ("--save-calibration", args.save_calibration.is_some()),
-    ];
-    let (format, others) = match args.format {
-        Format::Tmf8820 => ("tmf8820", &of_frames[..]),
-        Format::Frame => ("frame", &of_captures[..]),
+    let is_other = |(_, is_given, formats): &&(&str, bool, &[Format])| {
+        *is_given && !formats.contains(&args.format)
     };
-    if let Some((option, _)) = others.iter().find(|(_, is_given)| *is_given) {
+    if let Some((option, ..)) = options.iter().find(is_other) {
+        let format = match args.format {
+            Tmf8820 => "tmf8820",
+            Frame => "frame",
+            Counts => "counts",
+        };
         let message = format!("is not for --format {format}; leave it out");
         return Err(InputError::new(option, message).into());
     }
     match args.format {
         Format::Tmf8820 => tmf8820::run(args),
         Format::Frame => frame::run(args),
+        Format::Counts => counts::run(args),
     }
 }

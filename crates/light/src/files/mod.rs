@@ -17,6 +17,7 @@
 
 mod arrays;
 mod guarded;
+mod histograms;
 mod input;
 mod interruption;
 mod journal;
@@ -34,6 +35,7 @@ pub use guarded::{
     begins_with, guard_inputs, open_file, open_input, refuse_input, said_of_kept_files,
     set_aside_foreign,
 };
+pub use histograms::Histograms;
 pub use input::Lines;
 pub use input::{LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, too_long};
 pub(crate) use input::{MOST_TOML_BYTES, skip_mark};

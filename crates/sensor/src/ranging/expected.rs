@@ -114,6 +114,28 @@ impl Response {
         }
     }
 
+    /// Of one SPAD without noise, whose first photon in a bin counts.
+    pub(super) fn of_one_spad(bins: usize, pulse_sigma_bins: f64, dead_time_bins: f64) -> Self {
+        Response {
+            bins,
+            pulse_sigma_bins: pulse_sigma_bins.max(LEAST_SIGMA),
+            tail: None,
+            counting: Counting {
+                event_type: EventType::Greater,
+                threshold: 0,
+                spads: 1,
+            },
+            dead: Dead {
+                time_bins: dead_time_bins,
+                paralysable: false,
+                afterpulses: 0.0,
+                afterpulse_bins: 1e-9,
+                crosstalk: 0.0,
+            },
+            dead_time_spread: 0.0,
+        }
+    }
+
     /// What counts where this does not, and the other way round; `None` where that is no TYPE and THRESHOLD. Of light that makes
     /// this count less, the other counts more.
     pub(super) fn complement(&self) -> Option<Self> {

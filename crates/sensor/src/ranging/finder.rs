@@ -155,6 +155,28 @@ impl EchoFinder {
         })
     }
 
+    /// For counts that SPADs of this response have in so many laser cycles, with bins of `bin_s` seconds each.
+    pub(super) fn of_response(
+        response: Response,
+        bin_s: f64,
+        laser_cycles: u32,
+        options: &DepthOptions,
+    ) -> Self {
+        let walk = WalkCorrection {
+            response,
+            laser_cycles,
+        };
+        EchoFinder {
+            bin_s,
+            peak: options.peak,
+            ln_false_alarm: libm::log(options.false_alarm_rate),
+            scan: Scan::matched(response.pulse_sigma_bins, response.bins, laser_cycles),
+            full: None,
+            walk: options.correct_walk.then_some(Ok(walk)),
+            uncounted_of: None,
+        }
+    }
+
     /// The echo in `counts`, one entry per bin, earliest first; `None` if no bin stands out at all.
     pub fn find(&self, counts: &[u32]) -> Option<Sighting> {
         let Some(cycles) = self.uncounted_of else {

@@ -4,6 +4,7 @@ mod arrival;
 mod calibration;
 mod counting;
 mod dead_times;
+mod detector;
 mod expected;
 mod finder;
 mod likelihood;
@@ -19,6 +20,7 @@ mod walk;
 
 pub use arrival::{ArrivalOptions, arrival};
 pub use calibration::{Calibration, CalibrationError, Echo, ZoneCalibration};
+pub use detector::{Counted, DetectedReturn, Detector, NoReturn, TooManyCounts};
 pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};
 pub use peak::{Background, CentreOfMass, Peak, PeakOptions, centre_of_mass, interpolate};
