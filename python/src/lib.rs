@@ -12,6 +12,7 @@
 mod arrays;
 mod background;
 mod counts;
+mod detector;
 mod drive;
 mod failure;
 mod frame;
@@ -52,6 +53,8 @@ mod _gdtof {
 
     #[pymodule_export]
     use super::counts::range_counts;
+    #[pymodule_export]
+    use super::detector::{detector_agreement, detector_expected, detector_range};
     #[pymodule_export]
     use super::frame::frame;
     #[pymodule_export]

@@ -193,6 +193,20 @@ def replay(
     waves: str | PathLike[str] | None,
     progress: Callable[[int], object] | None,
 ) -> dict[str, Any]: ...
+def detector_range(
+    detector: tuple[int, float, float, float, int | None],
+    counts: NDArray[np.uint32],
+    false_alarm_rate: float,
+    correct_walk: bool,
+) -> dict[str, Any]: ...
+def detector_expected(
+    detector: tuple[int, float, float, float, int | None], light: tuple[float, float, float]
+) -> NDArray[np.float64]: ...
+def detector_agreement(
+    detector: tuple[int, float, float, float, int | None],
+    counts: NDArray[np.uint32],
+    expected: NDArray[np.float64],
+) -> list[tuple[float, int, float]]: ...
 def light(
     sensor: Sensor | None, scene: Scene | None, spads: int | None, fov_deg: float | None
 ) -> dict[str, Any]: ...

@@ -11,8 +11,14 @@ pub(super) enum Format {
     Tmf8820,
     /// Counts of a sensor like ours, rows x columns x bins (.npy), in the windows of a frame.json.
     Frame,
-    /// Counts of any sensor, zones x bins (.npy, or text with a line for each zone), with the bins that options describe.
+    /// Counts of any sensor, zones x bins (.npy, .json, or text with a line for each zone), with the bins that options describe.
     Counts,
+    /// A log of an ams TMF8820, TMF8821 or TMF8828 with lines #Raw.
+    Tmf882x,
+    /// A log of an ams TMF8829 with a Result_Set (JSON, packed by gzip or not).
+    Tmf8829,
+    /// A log of an ST VL53L5, VL53L7 or VL53L8 with lines "Agg, zone, word, ambient, word, values".
+    Cnh,
 }
 
 /// Which photons a histogram counts.
@@ -61,31 +67,37 @@ pub(in crate::cli) struct RangeArgs {
     /// frame: frame.json with sensor, scene, exposure and start values [default: the one beside the histograms].
     #[arg(long, value_name = "FILE")]
     pub(super) frame: Option<PathBuf>,
-    /// counts: length of a bin, ns.
+    /// Length of a bin, ns, for all formats but frame and tmf8820, as the next six options.
     #[arg(long, value_name = "NS")]
     pub(super) bin_width_ns: Option<f64>,
-    /// counts: when the first bin begins after the laser pulse has left, ns [default: 0].
-    #[arg(long, value_name = "NS", allow_negative_numbers = true)]
-    pub(super) start_ns: Option<f64>,
-    /// counts: laser cycles of a histogram.
-    #[arg(long, value_name = "N")]
-    pub(super) laser_cycles: Option<u32>,
-    /// counts: full width at half maximum of the laser pulse with all jitter, ns.
+    /// Full width at half maximum of the laser pulse with all jitter, ns.
     #[arg(long, value_name = "NS")]
     pub(super) pulse_fwhm_ns: Option<f64>,
-    /// counts: which photons a histogram counts [default: every].
+    /// When bin 0 begins after the centre of the laser pulse has left, ns [default: that of the reference histogram, or 0].
+    #[arg(long, value_name = "NS", allow_negative_numbers = true)]
+    pub(super) start_ns: Option<f64>,
+    /// Bins to look at, from 0, as in 4-50 [default: all].
+    #[arg(long, value_name = "FIRST-LAST")]
+    pub(super) bins: Option<String>,
+    /// Which photons a histogram counts [default: every].
     #[arg(long, value_enum)]
     pub(super) counts: Option<Counts>,
-    /// frame, counts: share of macropixels without an echo that may get a depth [default: 0.001].
+    /// Laser cycles of a histogram, with --counts first.
+    #[arg(long, value_name = "N")]
+    pub(super) laser_cycles: Option<u32>,
+    /// Counts for each unit of a file's numbers, where they are rates (counts, cnh) [default: they are counts].
+    #[arg(long, value_name = "N")]
+    pub(super) counts_per_unit: Option<f64>,
+    /// All but tmf8820: share of macropixels or zones without an echo that may get a depth [default: 0.001].
     #[arg(long, value_name = "P")]
     pub(super) false_alarm_rate: Option<f64>,
-    /// frame, counts: do not correct depths for the range walk of strong echoes.
+    /// All but tmf8820: do not correct depths for the range walk of strong echoes.
     #[arg(long)]
     pub(super) no_walk_correction: bool,
     /// File for the depths (CSV). tmf8820: capture,zone,true_m,depth_m,sensor_m; frame:
     /// row,col,start,true_m,guide_m,depth_m,bound_m,spread_m,photons,confidence,no_depth and
-    /// depth_N_m,bound_N_m,photons_N of the further returns, N from 2 to 4; counts: zone,depth_m,bound_m,spread_m,photons,confidence,no_depth
-    /// and the further returns.
+    /// depth_N_m,bound_N_m,photons_N of the further returns, N from 2 to 4; others:
+    /// capture,zone,depth_m,bound_m,spread_m,photons,confidence,no_depth,sensor_m and the further returns.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Print JSON instead of tables.

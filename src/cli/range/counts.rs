@@ -1,191 +1,278 @@
-//! `gdtof range --format counts`: depths from the histograms of any sensor. No chip of ours is pretended.
+//! `gdtof range` of any sensor's histograms: tables, arrays, and logs of evaluation kits. No chip of ours is pretended.
 
+use std::ops::Range;
 use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::args::{Counts, RangeArgs};
-use crate::cli::voice::{say_json, tell};
-use crate::files::{Histograms, InputError, OutputFile};
+use crate::cli::voice::{note, say_json, tell};
+use crate::files::{HistogramFormat, Histograms, InputError, OutputFile, ZoneCounts};
 use crate::ranging::{Counted, DepthOptions, DetectedReturn, Detector, NoReturn};
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
+use crate::system::RETURNS;
 
 /// Full width at half maximum of a Gaussian over its standard deviation.
 const FWHM_PER_SIGMA: f64 = 2.354_820_045;
 
-/// Returns that a table has columns for.
-const RETURNS: usize = 4;
-
-type Found = Result<Vec<DetectedReturn>, NoReturn>;
-
-/// What is printed with `--json` of a zone.
+/// A zone of a capture.
 #[derive(Serialize)]
 struct Zone {
-    returns: Vec<ZoneReturn>,
+    capture: usize,
+    zone: usize,
+    /// The clearest first.
+    returns: Vec<DetectedReturn>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    no_depth: Option<String>,
-}
-
-#[derive(Serialize)]
-struct ZoneReturn {
-    depth_m: f64,
-    bound_m: Option<f64>,
-    spread_m: Option<f64>,
-    photons: f64,
-    confidence: f64,
+    no_depth: Option<NoReturn>,
+    /// What the sensor itself made of it, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensor_m: Option<f64>,
 }
 
 /// Runs the command.
 ///
 /// # Errors
 /// Bad input, files that cannot be written.
-pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
-    let rate = args
-        .false_alarm_rate
-        .unwrap_or(DepthOptions::default().false_alarm_rate);
+pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<()> {
+    let default = DepthOptions::default();
+    let rate = args.false_alarm_rate.unwrap_or(default.false_alarm_rate);
     check_false_alarm_rate(rate, Spelling::Options)?;
     let options = DepthOptions {
         false_alarm_rate: rate,
         correct_walk: !args.no_walk_correction,
-        ..DepthOptions::default()
+        ..default
     };
-    let histograms = Histograms::read(&args.histograms)?;
-    let detector = detector(args, histograms.bins)?;
-    for (zone, counts) in histograms.zones().enumerate() {
-        detector.check(counts).map_err(|error| {
-            let message = format!("zone {zone} {error}; give more --laser-cycles, or --counts every");
-            InputError::new(args.histograms.display(), message)
-        })?;
+    if let Some(per_unit) = args.counts_per_unit {
+        within("--counts-per-unit", per_unit, (1e-9, 1e9))?;
     }
-    let zones: Vec<&[u32]> = histograms.zones().collect();
-    let found: Vec<Found> = zones
-        .par_iter()
-        .map(|counts| detector.returns(counts, &options))
+    let kept = args.bins.as_deref().map(bins).transpose()?;
+    let mut histograms = Histograms::read(&args.histograms, format, args.counts_per_unit)?;
+    let first_bin = kept.as_ref().map_or(0, |kept| kept.start);
+    if let Some(kept) = kept {
+        if kept.end > histograms.bins {
+            let message = format!(
+                "ends at bin {}, and {} has bins 0 to {}; give bins that it has",
+                kept.end - 1,
+                args.histograms.display(),
+                histograms.bins - 1
+            );
+            return Err(InputError::new("--bins", message).into());
+        }
+        histograms.keep_bins(kept);
+    }
+    if histograms.cut_short > 0 {
+        let (cut, all) = (histograms.cut_short, histograms.captures.len());
+        note(format_args!(
+            "{cut} captures without all histograms are left out, {all} are whole"
+        ));
+    }
+    let detector = detector_of(args, histograms.bins)?;
+    let zones: Vec<Zone> = (histograms.captures.par_iter().enumerate())
+        .map(|(number, capture)| {
+            let begins_s = begins_s(args, &detector, capture, number)?;
+            let detector = Detector {
+                begins_s: begins_s + first_bin as f64 * detector.bin_s,
+                ..detector
+            };
+            range(args, &detector, &options, (number, capture))
+        })
+        .collect::<Result<Vec<Vec<Zone>>, InputError>>()?
+        .into_iter()
+        .flatten()
         .collect();
     if let Some(path) = &args.out {
-        write_csv(path, &found)?;
+        write_csv(path, &zones)?;
     }
     if args.json {
-        let zones: Vec<Zone> = found.iter().map(as_json).collect();
         return say_json(&serde_json::json!({ "zones": zones }));
     }
-    Ok(tell(table(args, &found))?)
+    Ok(tell(table(args, &zones))?)
 }
 
-/// The detector of the options, all of which are checked.
-fn detector(args: &RangeArgs, bins: usize) -> Result<Detector, InputError> {
-    let needed = |option: &str, value: Option<f64>| {
-        value.ok_or_else(|| InputError::new(option, "is needed with --format counts; give it"))
+/// The zones of one capture.
+fn range(
+    args: &RangeArgs,
+    detector: &Detector,
+    options: &DepthOptions,
+    (number, capture): (usize, &ZoneCounts),
+) -> Result<Vec<Zone>, InputError> {
+    let range_zone = |(zone, counts): (usize, &[u32])| {
+        detector.check(counts).map_err(|error| {
+            let message = format!("zone {zone} {error}; correct --laser-cycles or --counts");
+            InputError::new(args.histograms.display(), message)
+        })?;
+        let found = detector.returns(counts, options);
+        Ok(Zone {
+            capture: number,
+            zone,
+            no_depth: found.as_ref().err().copied(),
+            returns: found.unwrap_or_default(),
+            sensor_m: capture.own_depths_m.get(zone).copied().flatten(),
+        })
     };
-    let within = |option: &str, value: f64, least: f64, most: f64| {
-        if (least..=most).contains(&value) {
-            return Ok(value);
-        }
-        let message = format!("{value} is impossible; give {least} to {most}");
-        Err(InputError::new(option, message))
-    };
-    let bin_ns = needed("--bin-width-ns", args.bin_width_ns)?;
-    let bin_ns = within("--bin-width-ns", bin_ns, 1e-3, 1e6)?;
-    let fwhm_ns = needed("--pulse-fwhm-ns", args.pulse_fwhm_ns)?;
-    let fwhm_ns = within("--pulse-fwhm-ns", fwhm_ns, 0.0, 1e6)?;
-    let begins_ns = within("--start-ns", args.start_ns.unwrap_or(0.0), -1e9, 1e9)?;
-    let laser_cycles = needed("--laser-cycles", args.laser_cycles.map(f64::from))? as u32;
-    if laser_cycles == 0 {
-        return Err(InputError::new("--laser-cycles", "0 is impossible; give 1 or more"));
+    let zones = capture.counts.par_chunks_exact(detector.bins);
+    zones.enumerate().map(range_zone).collect()
+}
+
+/// When bin 0 begins after the laser pulse has left.
+fn begins_s(
+    args: &RangeArgs,
+    detector: &Detector,
+    capture: &ZoneCounts,
+    number: usize,
+) -> Result<f64, InputError> {
+    if let Some(start_ns) = args.start_ns {
+        return Ok(1e-9 * start_ns);
     }
-    if fwhm_ns > 0.5 * bin_ns * bins as f64 {
+    let Some(reference) = &capture.reference else {
+        return Ok(0.0);
+    };
+    detector.begins_after_reference_s(reference).ok_or_else(|| {
         let message = format!(
-            "{fwhm_ns} is more than half of a histogram of {bins} bins of {bin_ns} ns; give the width of the laser pulse"
+            "capture {number} has no pulse in its reference histogram; say when bin 0 begins with --start-ns"
         );
-        return Err(InputError::new("--pulse-fwhm-ns", message));
-    }
-    Ok(Detector {
-        bins,
-        bin_s: 1e-9 * bin_ns,
-        begins_s: 1e-9 * begins_ns,
-        laser_cycles,
-        pulse_sigma_s: 1e-9 * fwhm_ns / FWHM_PER_SIGMA,
-        counted: match args.counts.unwrap_or(Counts::Every) {
-            Counts::Every => Counted::EveryPhoton,
-            Counts::First => Counted::FirstPhoton,
-        },
+        InputError::new(args.histograms.display(), message)
     })
 }
 
-fn as_json(found: &Found) -> Zone {
-    let as_return = |of: &DetectedReturn| ZoneReturn {
-        depth_m: of.depth_m,
-        bound_m: of.bound_m,
-        spread_m: of.spread_m,
-        photons: of.photons,
-        confidence: of.confidence,
+/// The detector of the options, all of which are checked.
+fn detector_of(args: &RangeArgs, bins: usize) -> Result<Detector, InputError> {
+    let needed = |option: &str, value: Option<f64>| {
+        let why = "is needed to make depths of bins; give it";
+        value.ok_or_else(|| InputError::new(option, why))
     };
-    match found {
-        Ok(returns) => Zone {
-            returns: returns.iter().map(as_return).collect(),
-            no_depth: None,
-        },
-        Err(why) => Zone {
-            returns: Vec::new(),
-            no_depth: Some(why.to_string()),
-        },
+    let bin_ns = needed("--bin-width-ns", args.bin_width_ns)?;
+    within("--bin-width-ns", bin_ns, (1e-3, 1e6))?;
+    let fwhm_ns = needed("--pulse-fwhm-ns", args.pulse_fwhm_ns)?;
+    within("--pulse-fwhm-ns", fwhm_ns, (0.0, 1e6))?;
+    within("--start-ns", args.start_ns.unwrap_or(0.0), (-1e9, 1e9))?;
+    let most_ns = 0.5 * bin_ns * bins as f64;
+    if fwhm_ns > most_ns {
+        let message = format!(
+            "{fwhm_ns} is more than half of {bins} bins of {bin_ns} ns; give the width of the laser pulse"
+        );
+        return Err(InputError::new("--pulse-fwhm-ns", message));
+    }
+    let counted = match (args.counts.unwrap_or(Counts::Every), args.laser_cycles) {
+        (Counts::Every, None) => Counted::EveryPhoton,
+        (Counts::Every, Some(_)) => {
+            let message = "is for --counts first alone; leave it out";
+            return Err(InputError::new("--laser-cycles", message));
+        }
+        (Counts::First, Some(laser_cycles @ 1..)) => Counted::FirstPhoton { laser_cycles },
+        (Counts::First, _) => {
+            let message = "is needed with --counts first; give 1 or more";
+            return Err(InputError::new("--laser-cycles", message));
+        }
+    };
+    Ok(Detector {
+        bins,
+        bin_s: 1e-9 * bin_ns,
+        begins_s: 0.0,
+        pulse_sigma_s: 1e-9 * fwhm_ns / FWHM_PER_SIGMA,
+        counted,
+    })
+}
+
+fn within(option: &str, value: f64, (least, most): (f64, f64)) -> Result<(), InputError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let message = format!("{value} is impossible; give {least} to {most}");
+    Err(InputError::new(option, message))
+}
+
+/// The bins of `4-50`, both of them included.
+fn bins(text: &str) -> Result<Range<usize>, InputError> {
+    let ends = text.split_once('-');
+    let ends = ends.and_then(|(a, b)| Some((a.parse().ok()?, b.parse::<usize>().ok()?)));
+    match ends {
+        Some((first, last)) if first < last && last < usize::MAX => Ok(first..last + 1),
+        _ => {
+            let message =
+                format!("`{text}` is no range of bins; give the first and the last, as in 4-50");
+            Err(InputError::new("--bins", message))
+        }
     }
 }
 
-fn table(args: &RangeArgs, found: &[Found]) -> Table {
+fn table(args: &RangeArgs, zones: &[Zone]) -> Table {
     let mut table = Table::new(format!("Depths of {}", args.histograms.display()));
-    let all = found.len();
-    let firsts: Vec<&DetectedReturn> = found.iter().flatten().filter_map(|of| of.first()).collect();
+    let all = zones.len();
+    let firsts: Vec<&DetectedReturn> = zones.iter().filter_map(|z| z.returns.first()).collect();
+    let captures = zones.last().map_or(0, |zone| 1 + zone.capture);
+    if captures > 1 {
+        table.push("captures", captures.to_string());
+    }
     table.push("zones with a depth", format!("{} of {all}", firsts.len()));
-    let median = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied()
-    };
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.4} m"));
     let depths = firsts.iter().map(|first| first.depth_m).collect();
     table.push("median depth", metres(median(depths)));
     let bounds = firsts.iter().filter_map(|first| first.bound_m).collect();
-    table.push("median bound, one standard deviation", metres(median(bounds)));
-    let further = found.iter().flatten().filter(|of| of.len() > 1).count();
+    table.push(
+        "median bound, one standard deviation",
+        metres(median(bounds)),
+    );
+    let further = zones.iter().filter(|zone| zone.returns.len() > 1).count();
     table.push("zones with further returns", format!("{further} of {all}"));
-    for why in [
-        NoReturn::NoSignificantPeak,
-        NoReturn::Saturated,
-        NoReturn::BehindSensor,
-    ] {
-        let count = found.iter().filter(|of| **of == Err(why)).count();
+    let beside: Vec<f64> = (zones.iter())
+        .filter_map(|zone| Some(zone.returns.first()?.depth_m - zone.sensor_m?))
+        .collect();
+    if !beside.is_empty() {
+        let count = beside.len();
+        let name = format!("median depth less the sensor's own, {count} zones that have both");
+        table.push(name, metres(median(beside)));
+    }
+    for why in NoReturn::ALL {
+        let count = zones
+            .iter()
+            .filter(|zone| zone.no_depth == Some(why))
+            .count();
         if count > 0 {
-            table.push(format!("zones without a depth: {why}"), format!("{count} of {all}"));
+            table.push(
+                format!("zones without a depth: {why}"),
+                format!("{count} of {all}"),
+            );
         }
     }
     table
 }
 
-fn write_csv(path: &Path, found: &[Found]) -> Result<(), InputError> {
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
     let shown = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6}"));
     OutputFile::write_with(path, |out| {
-        write!(out, "zone,depth_m,bound_m,spread_m,photons,confidence,no_depth")?;
+        write!(
+            out,
+            "capture,zone,depth_m,bound_m,spread_m,photons,confidence,no_depth,sensor_m"
+        )?;
         for n in 2..=RETURNS {
             write!(out, ",depth_{n}_m,bound_{n}_m,photons_{n}")?;
         }
         writeln!(out)?;
-        for (zone, found) in found.iter().enumerate() {
-            let returns = found.as_deref().unwrap_or_default();
-            let first = returns.first();
+        for zone in zones {
+            let first = zone.returns.first();
             write!(
                 out,
-                "{zone},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{}",
+                zone.capture,
+                zone.zone,
                 shown(first.map(|of| of.depth_m)),
                 shown(first.and_then(|of| of.bound_m)),
                 shown(first.and_then(|of| of.spread_m)),
                 shown(first.map(|of| of.photons)),
                 shown(first.map(|of| of.confidence)),
-                found.as_ref().err().map_or(String::new(), NoReturn::to_string),
+                zone.no_depth.map_or(String::new(), |why| why.to_string()),
+                shown(zone.sensor_m),
             )?;
             for n in 1..RETURNS {
-                let further = returns.get(n);
+                let further = zone.returns.get(n);
                 write!(
                     out,
                     ",{},{},{}",

@@ -1,4 +1,7 @@
 //! `gdtof range --format tmf8820`: depths from a real sensor's histograms, beside those it computed itself.
+//!
+//! Without true distances there are depths alone, and a calibration must be given. Without depths of the sensor, as where it gives 0
+//! everywhere, there is nothing beside.
 
 use serde::Serialize;
 
@@ -16,8 +19,8 @@ const LEAST_SIGNAL: f64 = 100.0;
 struct Sighting {
     capture: usize,
     echo: Echo,
-    true_m: f64,
-    sensor_m: f64,
+    true_m: Option<f64>,
+    sensor_m: Option<f64>,
 }
 
 /// Readings, a zone of a capture each, that no depth is taken from, by the first cause.
@@ -54,20 +57,22 @@ impl LeftOut {
     }
 }
 
-/// Every zone that sees the plane: the sensor reports a target there, and there is a pulse. Both criteria are
+/// Every zone that sees the plane: the sensor reports a target there if it does anywhere, and there is a pulse. Both criteria are
 /// about the same zones, so that the two depths are compared on equal terms.
 fn sightings(captures: &[Capture]) -> (Vec<Sighting>, LeftOut) {
     let options = ArrivalOptions::default();
     let mut found = Vec::new();
     let mut left_out = LeftOut::default();
+    let reports = |capture: &Capture| capture.on_chip_depths_mm.iter().any(|&mm| mm > 0.0);
+    let sensor_reports = captures.iter().any(reports);
     for (index, capture) in captures.iter().enumerate() {
         let Some(reference) = arrival(&capture.reference_hist, &options) else {
             left_out.no_reference_pulse += capture.hists.len();
             continue;
         };
         for (zone, counts) in capture.hists.iter().enumerate() {
-            let sensor_m = capture.on_chip_depths_mm[zone] * 1e-3;
-            if sensor_m <= 0.0 {
+            let sensor_mm = capture.on_chip_depths_mm.get(zone).filter(|mm| **mm > 0.0);
+            if sensor_reports && sensor_mm.is_none() {
                 left_out.no_target_reported += 1;
                 continue;
             }
@@ -84,7 +89,7 @@ fn sightings(captures: &[Capture]) -> (Vec<Sighting>, LeftOut) {
                     signal_counts: pulse.signal_counts,
                 },
                 true_m: capture.dist_to_plane_m,
-                sensor_m,
+                sensor_m: sensor_mm.map(|mm| 1e-3 * mm),
             });
         }
     }
@@ -95,7 +100,7 @@ fn sightings(captures: &[Capture]) -> (Vec<Sighting>, LeftOut) {
 fn fitted_on(captures: &[Capture], fit: Fit) -> Vec<bool> {
     let mut order: Vec<usize> = (0..captures.len()).collect();
     order.sort_by(|&a, &b| {
-        let distance = |i: usize| captures[i].dist_to_plane_m;
+        let distance = |i: usize| captures[i].dist_to_plane_m.unwrap_or(0.0);
         distance(a).total_cmp(&distance(b))
     });
     let mut fitted = vec![false; captures.len()];
@@ -111,7 +116,8 @@ fn fitted_on(captures: &[Capture], fit: Fit) -> Vec<bool> {
 }
 
 fn calibrate(args: &RangeArgs, zones: usize, of: &[&Sighting]) -> Result<Calibration, InputError> {
-    let known: Vec<(Echo, f64)> = of.iter().map(|s| (s.echo, s.true_m)).collect();
+    let known = of.iter().filter_map(|s| Some((s.echo, s.true_m?)));
+    let known: Vec<(Echo, f64)> = known.collect();
     Calibration::fit(zones, &known).map_err(|error| {
         let message = format!("{error}; calibrate on other or more captures (--fit)");
         InputError::new(args.histograms.display(), message)
@@ -140,7 +146,8 @@ struct Errors {
 }
 
 impl Errors {
-    fn of(errors_m: impl Iterator<Item = f64>) -> Self {
+    /// `None` without any.
+    fn of(errors_m: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut n, mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0, 0f64);
         for error in errors_m {
             n += 1.0;
@@ -148,11 +155,11 @@ impl Errors {
             squares += error * error;
             largest = largest.max(error.abs());
         }
-        Errors {
+        (n > 0.0).then(|| Errors {
             rms_mm: 1e3 * f64::sqrt(squares / n),
             mean_mm: 1e3 * sum / n,
             largest_mm: 1e3 * largest,
-        }
+        })
     }
 
     fn row(&self, name: &str) -> [String; 4] {
@@ -179,9 +186,12 @@ struct Report {
     reported: usize,
     fit: Option<Fit>,
     calibration: Calibration,
-    depths: Errors,
+    /// Median of all depths that are reported, m.
+    median_m: f64,
+    /// Of depths whose truth is known.
+    depths: Option<Errors>,
     /// The sensor's own depths as it gives them.
-    sensor: Errors,
+    sensor: Option<Errors>,
     /// The sensor's own depths after a straight line for every zone, fitted on the same captures as ours.
     sensor_refitted: Option<Errors>,
 }
@@ -194,6 +204,16 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     let fit = args.fit.unwrap_or(Fit::Even);
     let captures = tmf8820::read(&args.histograms)?;
     let zones = captures[0].hists.len();
+    let without_truth = captures
+        .iter()
+        .find(|capture| capture.dist_to_plane_m.is_none());
+    if let (None, Some(capture)) = (&args.calibration, without_truth) {
+        let message = format!(
+            "capture {} has no dist_to_plane_m to calibrate on; give it in metres, or a calibration with --calibration",
+            capture.capture
+        );
+        return Err(InputError::new(args.histograms.display(), message).into());
+    }
     let (sightings, left_out) = sightings(&captures);
     let on = match args.calibration {
         Some(_) => vec![false; captures.len()],
@@ -212,14 +232,20 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         Some(_) => None,
         None => {
             // Counts left out: the sensor has had them, and says nothing of a walk that is left.
-            let own = |s: &Sighting| Echo {
-                zone: s.echo.zone,
-                arrival_bins: s.sensor_m,
-                signal_counts: 0.0,
+            let own = |s: &Sighting| {
+                let echo = Echo {
+                    zone: s.echo.zone,
+                    arrival_bins: s.sensor_m?,
+                    signal_counts: 0.0,
+                };
+                Some((echo, s.true_m?))
             };
-            let known: Vec<(Echo, f64)> = fitted.iter().map(|s| (own(s), s.true_m)).collect();
+            let known: Vec<(Echo, f64)> = fitted.iter().filter_map(|s| own(s)).collect();
             let line = Calibration::fit(zones, &known).ok();
-            line.map(|line| Errors::of(reported.iter().map(|s| line.depth_m(&own(s)) - s.true_m)))
+            line.and_then(|line| {
+                let known = reported.iter().filter_map(|s| own(s));
+                Errors::of(known.map(|(echo, true_m)| line.depth_m(&echo) - true_m))
+            })
         }
     };
     let depth = |s: &Sighting| calibration.depth_m(&s.echo);
@@ -235,11 +261,10 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
             writeln!(out, "capture,zone,true_m,depth_m,sensor_m")?;
             for s in &reported {
                 let (capture, zone) = (captures[s.capture].capture, s.echo.zone);
-                let (true_m, depth_m, sensor_m) = (s.true_m, depth(s), s.sensor_m);
-                writeln!(
-                    out,
-                    "{capture},{zone},{true_m:.6},{depth_m:.6},{sensor_m:.6}"
-                )?;
+                let shown = |m: Option<f64>| m.map_or(String::new(), |m| format!("{m:.6}"));
+                let (true_m, depth_m) = (shown(s.true_m), depth(s));
+                let sensor_m = shown(s.sensor_m);
+                writeln!(out, "{capture},{zone},{true_m},{depth_m:.6},{sensor_m}")?;
             }
             Ok(())
         })?);
@@ -252,8 +277,13 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         left_out,
         reported: reported.len(),
         fit: args.calibration.is_none().then_some(fit),
-        depths: Errors::of(reported.iter().map(|s| depth(s) - s.true_m)),
-        sensor: Errors::of(reported.iter().map(|s| s.sensor_m - s.true_m)),
+        median_m: median(reported.iter().map(|s| depth(s)).collect()),
+        depths: Errors::of(reported.iter().filter_map(|s| Some(depth(s) - s.true_m?))),
+        sensor: Errors::of(
+            reported
+                .iter()
+                .filter_map(|s| Some(s.sensor_m? - s.true_m?)),
+        ),
         sensor_refitted,
         calibration,
     };
@@ -264,13 +294,34 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Of at least one number.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
 fn table(report: &Report) -> String {
     let mut errors = Grid::headed("depth to the plane | RMS (mm) | mean (mm) | largest (mm)");
-    errors.push(report.depths.row("gdtof"));
-    errors.push(report.sensor.row("the sensor's own"));
-    if let Some(refitted) = &report.sensor_refitted {
-        errors.push(refitted.row("the sensor's own, a line fitted to each zone"));
+    for (name, of) in [
+        ("gdtof", &report.depths),
+        ("the sensor's own", &report.sensor),
+        (
+            "the sensor's own, a line fitted to each zone",
+            &report.sensor_refitted,
+        ),
+    ] {
+        if let Some(of) = of {
+            errors.push(of.row(name));
+        }
     }
+    let errors = if report.depths.is_some() {
+        errors.to_string()
+    } else {
+        format!(
+            "true distances are not known; the median depth is {:.4} m\n",
+            report.median_m
+        )
+    };
     let mut lines = Grid::new(["zone", "mm a bin", "offset (mm)"]);
     for (zone, line) in report.calibration.zones.iter().enumerate() {
         lines.push([

@@ -5,6 +5,7 @@
 //! | `input.rs` | texts, read whole or line by line, and what is no text refused |
 //! | `arrays.rs` | NumPy files of known shape: results that are read again, users' counts |
 //! | `npy.rs` | NumPy files: head and elements |
+//! | `histograms/` | histograms of any sensor: tables, arrays, logs of evaluation kits |
 //! | `misfit.rs` | values of the wrong type, without the names of types |
 //! | `no_toml.rs` | settings that are no TOML, and files of other kinds in their place |
 //! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM, EXR |
@@ -35,7 +36,7 @@ pub use guarded::{
     begins_with, guard_inputs, open_file, open_input, refuse_input, said_of_kept_files,
     set_aside_foreign,
 };
-pub use histograms::Histograms;
+pub use histograms::{HistogramFormat, Histograms, ZoneCounts};
 pub use input::Lines;
 pub use input::{LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, too_long};
 pub(crate) use input::{MOST_TOML_BYTES, skip_mark};

@@ -239,7 +239,9 @@ impl NpyHead {
         let kind = self.descr.trim_matches(['\'', '<', '>', '|', '=']);
         let (sort, width) = kind.split_at_checked(1)?;
         let width = match (sort, width) {
-            ("u" | "i", "1" | "2" | "4" | "8") | ("f", "4" | "8") | ("b", "1") => width.parse().ok()?,
+            ("u" | "i", "1" | "2" | "4" | "8") | ("f", "4" | "8") | ("b", "1") => {
+                width.parse().ok()?
+            }
             _ => return None,
         };
         let number = |bytes: &[u8]| {

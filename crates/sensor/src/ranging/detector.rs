@@ -7,15 +7,20 @@
 //!
 //! The echo finder is that of our own chip, whose bins count at most once a laser cycle:
 //!
-//! * Bins that count every photon count like ours in very many laser cycles of very little light. A hundred times as many laser cycles as
-//!   the fullest bin has counts are taken, so that less than 1 % of a bin's light falls together.
+//! * Bins that count every photon count like ours in very many laser cycles of very little light. They are taken for a hundred times as many
+//!   laser cycles as the fullest bin has counts, so that less than 1 % of a bin's light falls together.
 //! * The first photon blinds a SPAD of ours that is blind for longer than the window.
 //!
 //! No timing of gates is asked for.
 
+mod mean;
+
+use super::arrival::{ArrivalOptions, arrival};
 use super::expected::Response;
 use super::finder::{DepthOptions, EchoFinder};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+pub use mean::{Agreement, SurfaceLight};
 
 /// Laser cycles for each count of the fullest bin, where every photon counts.
 const CYCLES_PER_COUNT: u32 = 100;
@@ -26,7 +31,10 @@ pub enum Counted {
     /// All of them.
     EveryPhoton,
     /// The first of each laser cycle.
-    FirstPhoton,
+    FirstPhoton {
+        /// Laser cycles of a histogram.
+        laser_cycles: u32,
+    },
 }
 
 /// What counts photons: bins of one length, and laser pulses of one width.
@@ -38,8 +46,6 @@ pub struct Detector {
     pub bin_s: f64,
     /// When the first bin begins after the centre of the laser pulse has left, s.
     pub begins_s: f64,
-    /// Laser cycles of a histogram.
-    pub laser_cycles: u32,
     /// Standard deviation of the laser pulse with all jitter, s.
     pub pulse_sigma_s: f64,
     /// Which photons count.
@@ -47,7 +53,7 @@ pub struct Detector {
 }
 
 /// An echo in a histogram.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct DetectedReturn {
     /// Distance, m.
     pub depth_m: f64,
@@ -55,14 +61,15 @@ pub struct DetectedReturn {
     pub bound_m: Option<f64>,
     /// Standard deviation of the depths that the zone sees there, m.
     pub spread_m: Option<f64>,
-    /// Photons of the echo in a laser cycle.
+    /// Photons of the echo in all laser cycles.
     pub photons: f64,
     /// −log₁₀ of the chance that light without this echo makes such counts.
     pub confidence: f64,
 }
 
 /// Why a histogram has no echo.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum NoReturn {
     /// No stretch of bins stands out.
     #[error("no significant peak")]
@@ -77,10 +84,21 @@ pub enum NoReturn {
 
 /// More counts than laser cycles, where only the first photon of each counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("has {counts} counts in {laser_cycles} laser cycles, each of which counts its first photon only")]
+#[error(
+    "has {counts} counts in {laser_cycles} laser cycles, each of which counts its first photon only"
+)]
 pub struct TooManyCounts {
     counts: u64,
     laser_cycles: u32,
+}
+
+impl NoReturn {
+    /// All of them.
+    pub const ALL: [NoReturn; 3] = [
+        NoReturn::NoSignificantPeak,
+        NoReturn::Saturated,
+        NoReturn::BehindSensor,
+    ];
 }
 
 impl Detector {
@@ -90,13 +108,15 @@ impl Detector {
     /// More counts than the detector can have.
     pub fn check(&self, counts: &[u32]) -> Result<(), TooManyCounts> {
         let all: u64 = counts.iter().map(|&n| u64::from(n)).sum();
-        if self.counted == Counted::FirstPhoton && all > u64::from(self.laser_cycles) {
-            return Err(TooManyCounts {
-                counts: all,
-                laser_cycles: self.laser_cycles,
-            });
+        match self.counted {
+            Counted::FirstPhoton { laser_cycles } if all > u64::from(laser_cycles) => {
+                Err(TooManyCounts {
+                    counts: all,
+                    laser_cycles,
+                })
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// The echoes in `counts`, one for each bin, the clearest first.
@@ -121,8 +141,7 @@ impl Detector {
         let place_m = |position_bins: f64| {
             0.5 * SPEED_OF_LIGHT_M_PER_S * self.begins_s + (position_bins + 0.5) * to_m
         };
-        // Photons of a laser cycle as the finder has them, in a laser cycle of the detector.
-        let of_own = f64::from(self.cycles(counts)) / f64::from(self.laser_cycles);
+        let laser_cycles = f64::from(self.laser_cycles(counts));
         let bound_m = sighting.bound_bins.map(|bins| bins * to_m);
         let depth_m = place_m(sighting.position_bins);
         if depth_m < -bound_m.map_or(to_m, |bound_m| 5.0 * bound_m) {
@@ -134,8 +153,8 @@ impl Detector {
             bound_m,
             spread_m: bound_m.and(spread_bins).map(|bins| bins * to_m),
             photons: match sighting.light {
-                Some(light) => light.signal * of_own,
-                None => sighting.peak.signal_counts / f64::from(self.laser_cycles),
+                Some(light) => light.signal * laser_cycles,
+                None => sighting.peak.signal_counts,
             },
             confidence: sighting.confidence,
         };
@@ -144,20 +163,26 @@ impl Detector {
             depth_m: place_m(other.position_bins),
             bound_m: other.bound_bins.map(|bins| bins * to_m),
             spread_m: other.spread_bins.map(|bins| bins * to_m),
-            photons: other.photons * of_own,
+            photons: other.photons * laser_cycles,
             confidence: other.confidence,
         });
         Ok(std::iter::once(first).chain(others).collect())
     }
 
+    /// When bin 0 begins after the laser pulse has left, s, if `reference` has counts of the pulse itself in such bins; `None` without a
+    /// pulse.
+    pub fn begins_after_reference_s(&self, reference: &[u32]) -> Option<f64> {
+        let pulse = arrival(reference, &ArrivalOptions::default())?;
+        Some(-(pulse.position_bins + 0.5) * self.bin_s)
+    }
+
     /// Laser cycles in which our bins would count like this detector's.
-    fn cycles(&self, counts: &[u32]) -> u32 {
+    fn laser_cycles(&self, counts: &[u32]) -> u32 {
         match self.counted {
-            Counted::FirstPhoton => self.laser_cycles,
+            Counted::FirstPhoton { laser_cycles } => laser_cycles,
             Counted::EveryPhoton => {
                 let most = counts.iter().copied().max().unwrap_or(0);
-                let enough = most.saturating_mul(CYCLES_PER_COUNT);
-                enough.max(self.laser_cycles)
+                most.saturating_mul(CYCLES_PER_COUNT).max(CYCLES_PER_COUNT)
             }
         }
     }
@@ -165,14 +190,11 @@ impl Detector {
     fn finder(&self, counts: &[u32], options: &DepthOptions) -> EchoFinder {
         let dead_time_bins = match self.counted {
             Counted::EveryPhoton => 1.0,
-            Counted::FirstPhoton => 2.0 * self.bins as f64,
+            Counted::FirstPhoton { .. } => 2.0 * self.bins as f64,
         };
-        let response = Response::of_one_spad(
-            self.bins,
-            self.pulse_sigma_s / self.bin_s,
-            dead_time_bins,
-        );
-        EchoFinder::of_response(response, self.bin_s, self.cycles(counts), options)
+        let response =
+            Response::of_one_spad(self.bins, self.pulse_sigma_s / self.bin_s, dead_time_bins);
+        EchoFinder::of_response(response, self.bin_s, self.laser_cycles(counts), options)
     }
 }
 
@@ -182,14 +204,17 @@ mod tests {
     use rand::rngs::StdRng;
     use rand::{RngExt, SeedableRng};
 
-    const BINS: usize = 64;
+    pub(super) const BINS: usize = 64;
+    pub(super) const LASER_CYCLES: u32 = 2000;
+    pub(super) const FIRST: Counted = Counted::FirstPhoton {
+        laser_cycles: LASER_CYCLES,
+    };
 
-    fn detector(counted: Counted) -> Detector {
+    pub(super) fn detector(counted: Counted) -> Detector {
         Detector {
             bins: BINS,
             bin_s: 1e-9,
             begins_s: 20e-9,
-            laser_cycles: 2000,
             pulse_sigma_s: 0.8e-9,
             counted,
         }
@@ -201,14 +226,14 @@ mod tests {
     }
 
     /// A histogram of an echo at `place_bins` with `signal` photons a laser cycle, over `background` photons in all bins, photon by photon.
-    fn histogram(
+    pub(super) fn histogram(
         random: &mut StdRng,
         detector: &Detector,
         (place_bins, signal, background): (f64, f64, f64),
     ) -> Vec<u32> {
         let mut counts = vec![0; BINS];
         let sigma_bins = detector.pulse_sigma_s / detector.bin_s;
-        for _ in 0..detector.laser_cycles {
+        for _ in 0..LASER_CYCLES {
             let mut times = Vec::new();
             // Each photon is one of twenty that may come: nearly a Poisson number.
             for _ in 0..20 {
@@ -220,7 +245,7 @@ mod tests {
                 }
             }
             times.retain(|time| (0.0..BINS as f64).contains(time));
-            if detector.counted == Counted::FirstPhoton {
+            if detector.counted == FIRST {
                 let first = times.iter().copied().min_by(f64::total_cmp);
                 times = first.into_iter().collect();
             }
@@ -234,7 +259,7 @@ mod tests {
     #[test]
     fn depths_of_photons_drawn_one_by_one_keep_their_bounds() {
         let mut random = StdRng::seed_from_u64(1);
-        for counted in [Counted::EveryPhoton, Counted::FirstPhoton] {
+        for counted in [Counted::EveryPhoton, FIRST] {
             let detector = detector(counted);
             let to_m = 0.5 * SPEED_OF_LIGHT_M_PER_S * detector.bin_s;
             for (signal, background) in [(0.05, 0.2), (0.3, 0.5), (1.5, 0.5)] {
@@ -250,17 +275,26 @@ mod tests {
                     let true_m = (20.0 + place_bins + 0.5) * to_m;
                     let off_m = first.depth_m - true_m;
                     let bound_m = first.bound_m.unwrap();
-                    assert!(off_m.abs() < 5.0 * bound_m, "{counted:?} {light:?} {first:?}");
+                    assert!(
+                        off_m.abs() < 5.0 * bound_m,
+                        "{counted:?} {light:?} {first:?}"
+                    );
                     squares += off_m * off_m;
                     sum += off_m;
                     bounds += bound_m * bound_m;
-                    photons += first.photons;
+                    photons += first.photons / f64::from(LASER_CYCLES);
                 }
                 let of = REPEATS as f64;
                 let (rms_m, bound_m) = ((squares / of).sqrt(), (bounds / of).sqrt());
-                assert!(rms_m < 1.4 * bound_m, "{counted:?} {signal}: {rms_m} {bound_m}");
+                assert!(
+                    rms_m < 1.4 * bound_m,
+                    "{counted:?} {signal}: {rms_m} {bound_m}"
+                );
                 assert!((sum / of).abs() < 4.0 * bound_m / of.sqrt());
-                assert!((photons / of / signal - 1.0).abs() < 0.1, "{counted:?} {signal}: {photons}");
+                assert!(
+                    (photons / of / signal - 1.0).abs() < 0.1,
+                    "{counted:?} {signal}: {photons}"
+                );
             }
         }
     }
@@ -272,9 +306,9 @@ mod tests {
         let dark = histogram(&mut random, &every, (20.0, 0.0, 0.8));
         let none = every.returns(&dark, &DepthOptions::default());
         assert_eq!(none, Err(NoReturn::NoSignificantPeak));
-        let first = detector(Counted::FirstPhoton);
+        let first = detector(FIRST);
         let mut many = vec![0; BINS];
-        many[3] = 2001;
+        many[3] = LASER_CYCLES + 1;
         assert!(every.check(&many).is_ok() && first.check(&many).is_err());
     }
 }

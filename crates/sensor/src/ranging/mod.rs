@@ -20,7 +20,9 @@ mod walk;
 
 pub use arrival::{ArrivalOptions, arrival};
 pub use calibration::{Calibration, CalibrationError, Echo, ZoneCalibration};
-pub use detector::{Counted, DetectedReturn, Detector, NoReturn, TooManyCounts};
+pub use detector::{
+    Agreement, Counted, DetectedReturn, Detector, NoReturn, SurfaceLight, TooManyCounts,
+};
 pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};
 pub use peak::{Background, CentreOfMass, Peak, PeakOptions, centre_of_mass, interpolate};

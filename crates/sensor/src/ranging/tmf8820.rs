@@ -5,10 +5,12 @@
 //! | key | what |
 //! |---|---|
 //! | `capture` | number of the capture |
-//! | `dist_to_plane_m` | true distance to a plane in front of the sensor, m |
+//! | `dist_to_plane_m` | true distance to a plane in front of the sensor, m; may be left out |
 //! | `reference_hist` | counts of the light that goes straight from the laser to a SPAD, one per bin |
 //! | `hists` | counts, zones × bins |
-//! | `on_chip_depths_mm` | what the sensor itself made of each zone, mm; 0 where it saw no target |
+//! | `on_chip_depths_mm` | what the sensor itself made of each zone, mm; 0 where it saw no target; may be left out |
+//!
+//! Other keys are passed over.
 
 use std::path::Path;
 
@@ -16,19 +18,23 @@ use serde::Deserialize;
 
 use crate::files::{InputError, parse_json, read_text};
 
+/// Further than such a sensor sees by far, m: a distance that is given in mm.
+const FURTHEST_M: f64 = 50.0;
+
 /// One capture.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Capture {
     /// Number of the capture.
+    #[serde(default)]
     pub capture: u64,
-    /// True distance to the plane, m.
-    pub dist_to_plane_m: f64,
+    /// True distance to the plane, m, if it is known.
+    pub dist_to_plane_m: Option<f64>,
     /// Reference counts, one per bin.
     pub reference_hist: Vec<u32>,
     /// Counts, zones × bins.
     pub hists: Vec<Vec<u32>>,
-    /// The sensor's own depths, mm, one per zone; 0 where it saw no target.
+    /// The sensor's own depths, mm, one per zone; 0 where it saw no target. Empty if they are not known.
+    #[serde(default)]
     pub on_chip_depths_mm: Vec<f64>,
 }
 
@@ -55,7 +61,7 @@ fn parse(source: impl std::fmt::Display, text: &str) -> Result<Vec<Capture>, Inp
     }
     for capture in &captures {
         let fits = capture.hists.len() == zones
-            && capture.on_chip_depths_mm.len() == zones
+            && [0, zones].contains(&capture.on_chip_depths_mm.len())
             && capture.reference_hist.len() == bins
             && capture.hists.iter().all(|counts| counts.len() == bins);
         if !fits {
@@ -65,9 +71,12 @@ fn parse(source: impl std::fmt::Display, text: &str) -> Result<Vec<Capture>, Inp
             );
             return Err(InputError::new(source, message));
         }
-        if !capture.dist_to_plane_m.is_finite() {
+        let Some(plane_m) = capture.dist_to_plane_m else {
+            continue;
+        };
+        if !(0.0..=FURTHEST_M).contains(&plane_m) {
             let message = format!(
-                "capture {} has no finite dist_to_plane_m; correct or remove it",
+                "capture {} has a dist_to_plane_m of {plane_m}, which no such sensor sees; give metres, from 0 to {FURTHEST_M}",
                 capture.capture
             );
             return Err(InputError::new(source, message));
@@ -104,5 +113,18 @@ mod tests {
         assert!(error(&GOOD.replace("[99, 101]", "[99]")).contains("capture 0"));
         assert!(error(&GOOD.replace("9, 2]", "-9, 2]")).starts_with("a.json:2:"));
         assert!(error(&GOOD.replace("[[0, 1, 7], [0, 2, 8]]", "[]")).contains("no zones"));
+        assert!(error(&GOOD.replace("0.1", "600")).contains("give metres"));
+        assert!(error(&GOOD.replace("0.1", "-0.6")).contains("give metres"));
+    }
+
+    #[test]
+    fn what_a_logger_adds_or_leaves_out_is_no_fault() {
+        let read = |text: &str| parse("a.json", text).unwrap().remove(0);
+        let more = read(&GOOD.replace("{", r#"{"temperature": 27, "#));
+        assert_eq!(more.dist_to_plane_m, Some(0.1));
+        let less = GOOD.replace(r#""dist_to_plane_m": 0.1, "#, "");
+        let less = read(&less.replace(",\n \"on_chip_depths_mm\": [99, 101]", ""));
+        assert_eq!(less.dist_to_plane_m, None);
+        assert!(less.on_chip_depths_mm.is_empty());
     }
 }
