@@ -12,6 +12,9 @@ GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     real_histograms_are_ranged::the_sample_captures_are_ranged
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
+    histograms_of_any_sensor_are_ranged::the_sample_logs_give_their_distances \
+    histograms_of_any_sensor_are_ranged::a_table_is_ranged_and_written
+GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     the_book_lists_every_key::with_its_unit_range_and_source
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     the_same_everywhere::with_any_number_of_threads

@@ -45,7 +45,7 @@ pub fn role(command: &str, argument: &str) -> Role {
         (
             _,
             "census" | "left_right" | "plots" | "cell" | "windows" | "probe" | "pixel" | "names"
-            | "plot" | "only",
+            | "plot" | "only" | "bins",
         ) => Text,
         _ => panic!("enter the argument {argument} of {command} here"),
     }

@@ -25,6 +25,7 @@ mod frames_for_other_tools;
 mod golden_vectors_hold;
 mod guides_from_the_command_line;
 mod heat_reaches_the_chip;
+mod histograms_of_any_sensor_are_ranged;
 mod kept_inputs_are_read;
 mod libraries_in_any_syntax;
 mod libraries_make_the_chip;

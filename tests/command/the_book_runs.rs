@@ -83,7 +83,14 @@ fn every_command_runs() {
             let empty = tempfile::tempdir().unwrap();
             // What a chapter names of the repository.
             let [from, to] = [Path::new(env!("CARGO_MANIFEST_DIR")), empty.path()];
-            for folder in ["examples/blocks", "examples/scenes", "vectors/liberty"].map(Path::new) {
+            for folder in [
+                "examples/blocks",
+                "examples/scenes",
+                "vectors/liberty",
+                "vectors/range",
+            ]
+            .map(Path::new)
+            {
                 std::fs::create_dir_all(to.join(folder)).unwrap();
                 for entry in std::fs::read_dir(from.join(folder)).unwrap() {
                     let name = folder.join(entry.unwrap().file_name());

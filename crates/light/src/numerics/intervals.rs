@@ -37,6 +37,12 @@ impl Estimate {
     }
 }
 
+/// The chance that a sum of `freedom` ≥ 1 squared standard normal numbers is at least `chi_squared`.
+pub fn chi_squared_above(chi_squared: f64, freedom: usize) -> f64 {
+    let law = ChiSquared::new(freedom as f64).expect("at least one number");
+    law.sf(chi_squared)
+}
+
 /// Share `successes`/`trials` (`trials` > 0) with Wilson's interval.
 pub fn share(successes: f64, trials: f64) -> Estimate {
     let p = successes / trials;

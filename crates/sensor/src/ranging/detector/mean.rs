@@ -8,9 +8,8 @@
 //! Counts are compared by χ²: bins are put together with the next ones until five counts are expected. Where only first photons count,
 //! laser cycles without any are a further cell. Source: Pearson 1900; five is the usual least (Cochran 1954).
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
 use super::{Counted, Detector};
+use crate::numerics::intervals::chi_squared_above;
 use crate::numerics::normal_above;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -105,11 +104,10 @@ impl Detector {
             }
         };
         let chi_squared: f64 = cells.iter().map(square).sum();
-        let law = ChiSquared::new(freedom.max(1) as f64).expect("at least one cell");
         Agreement {
             chi_squared,
             cells: cells.len(),
-            p: law.sf(chi_squared),
+            p: chi_squared_above(chi_squared, freedom.max(1)),
         }
     }
 }
