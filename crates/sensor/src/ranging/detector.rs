@@ -5,25 +5,24 @@
 //!   first photon   a laser cycle counts its first photon, in one bin       later bins see what is left (pile-up)
 //! ```
 //!
-//! The echo finder is that of our own chip, whose bins count at most once a laser cycle:
-//!
-//! * Bins that count every photon count like ours in very many laser cycles of very little light. They are taken for a hundred times as many
-//!   laser cycles as the fullest bin has counts, so that less than 1 % of a bin's light falls together.
-//! * The first photon blinds a SPAD of ours that is blind for longer than the window.
+//! The echo finder is that of our own chip, whose bins count at most once a laser cycle. A histogram is taken for one of a hundred times
+//! as many laser cycles with as much less light, so that the bins are hardly tied together. What ties first photons together is in the mean
+//! histogram ([`expected`](super::expected)); the search for echoes knows from the counts before a bin in what share of laser cycles it was
+//! still to count (Coates 1968, doi 10.1088/0022-3735/1/8/437).
 //!
 //! No timing of gates is asked for.
 
 mod mean;
 
 use super::arrival::{ArrivalOptions, arrival};
-use super::expected::Response;
+use super::expected::{OtherBins, Response};
 use super::finder::{DepthOptions, EchoFinder};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 pub use mean::{Agreement, SurfaceLight};
 
-/// Laser cycles for each count of the fullest bin, where every photon counts.
-const CYCLES_PER_COUNT: u32 = 100;
+/// Parts that a laser cycle of first photons is cut into; and laser cycles for each count of the fullest bin, where every photon counts.
+const PARTS: u32 = 100;
 
 /// Which photons a detector counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,7 +129,13 @@ impl Detector {
     ) -> Result<Vec<DetectedReturn>, NoReturn> {
         debug_assert_eq!(counts.len(), self.bins);
         let finder = self.finder(counts, options);
-        let sighting = finder.find(counts).ok_or(NoReturn::NoSignificantPeak)?;
+        let sighting = match self.counted {
+            Counted::EveryPhoton => finder.find(counts),
+            Counted::FirstPhoton { laser_cycles } => {
+                finder.find_in(counts, &shares_of_cycles(counts, laser_cycles))
+            }
+        };
+        let sighting = sighting.ok_or(NoReturn::NoSignificantPeak)?;
         if !sighting.is_significant {
             return Err(NoReturn::NoSignificantPeak);
         }
@@ -178,24 +183,38 @@ impl Detector {
 
     /// Laser cycles in which our bins would count like this detector's.
     fn laser_cycles(&self, counts: &[u32]) -> u32 {
-        match self.counted {
+        let most = match self.counted {
             Counted::FirstPhoton { laser_cycles } => laser_cycles,
-            Counted::EveryPhoton => {
-                let most = counts.iter().copied().max().unwrap_or(0);
-                most.saturating_mul(CYCLES_PER_COUNT).max(CYCLES_PER_COUNT)
-            }
-        }
+            Counted::EveryPhoton => counts.iter().copied().max().unwrap_or(0),
+        };
+        most.max(1).saturating_mul(PARTS)
     }
 
     fn finder(&self, counts: &[u32], options: &DepthOptions) -> EchoFinder {
-        let dead_time_bins = match self.counted {
-            Counted::EveryPhoton => 1.0,
-            Counted::FirstPhoton { .. } => 2.0 * self.bins as f64,
+        let law = match self.counted {
+            Counted::EveryPhoton => OtherBins::EveryPhoton,
+            Counted::FirstPhoton { .. } => OtherBins::FirstPhoton {
+                parts: f64::from(PARTS),
+            },
         };
-        let response =
-            Response::of_one_spad(self.bins, self.pulse_sigma_s / self.bin_s, dead_time_bins);
+        let sigma_bins = self.pulse_sigma_s / self.bin_s;
+        let response = Response::of_other_bins(self.bins, sigma_bins, law);
         EchoFinder::of_response(response, self.bin_s, self.laser_cycles(counts), options)
     }
+}
+
+/// The share of laser cycles in which each bin was still to count, 1 on average.
+fn shares_of_cycles(counts: &[u32], laser_cycles: u32) -> Vec<f64> {
+    let mut left = f64::from(laser_cycles);
+    let shares = counts.iter().map(|&count| {
+        let share = left.max(1e-3);
+        left -= f64::from(count);
+        share
+    });
+    let mut shares: Vec<f64> = shares.collect();
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    shares.iter_mut().for_each(|share| *share /= mean);
+    shares
 }
 
 #[cfg(test)]

@@ -14,6 +14,8 @@
 //!
 //! Assumed: SPADs alike ([`dead_times`](super::dead_times) says what it costs where they are not), and recovered from the echo before the next laser cycle's.
 
+mod other_bins;
+
 use super::counting::Counting;
 use super::plain::{self, LANES};
 use super::pulse::{PULSE_REACH, Pulse, Tail};
@@ -21,6 +23,8 @@ use super::spad_state::{Dead, Spad};
 use crate::chip::{EventType, SensorConfig};
 use crate::numerics::Dual;
 use crate::photon::{EchoWidth, TAIL_REACH};
+
+pub(super) use other_bins::OtherBins;
 
 /// Steps to a bin, at least.
 const STEPS: usize = 4;
@@ -80,6 +84,8 @@ pub struct Response {
     dead: Dead,
     /// Standard deviation of dead times, relative to their mean.
     pub(super) dead_time_spread: f64,
+    /// Of bins that count otherwise; dead time says nothing there.
+    other_bins: Option<OtherBins>,
 }
 
 impl Response {
@@ -111,11 +117,12 @@ impl Response {
                 crosstalk: config.crosstalk_probability * neighbours,
             },
             dead_time_spread: config.dead_time_spread,
+            other_bins: None,
         }
     }
 
-    /// Of one SPAD without noise, whose first photon in a bin counts.
-    pub(super) fn of_one_spad(bins: usize, pulse_sigma_bins: f64, dead_time_bins: f64) -> Self {
+    /// Of a sensor whose bins are not ours.
+    pub(super) fn of_other_bins(bins: usize, pulse_sigma_bins: f64, law: OtherBins) -> Self {
         Response {
             bins,
             pulse_sigma_bins: pulse_sigma_bins.max(LEAST_SIGMA),
@@ -126,13 +133,14 @@ impl Response {
                 spads: 1,
             },
             dead: Dead {
-                time_bins: dead_time_bins,
+                time_bins: 1.0,
                 paralysable: false,
                 afterpulses: 0.0,
                 afterpulse_bins: 1e-9,
                 crosstalk: 0.0,
             },
             dead_time_spread: 0.0,
+            other_bins: Some(law),
         }
     }
 
@@ -195,6 +203,9 @@ impl Response {
 
     /// Steps to a bin; of plain SPADs in bins where the pulse or what recovers from it needs them.
     fn steps(&self, light: &EchoLight, steps: Steps) -> usize {
+        if self.other_bins.is_some() {
+            return 1;
+        }
         let sigma = light.sigma_bins.max(1e-3);
         let (least, of_rate, most) = if self.dead.is_plain() {
             let of_pulse = (STEPS_OF_SIGMA / sigma).min(MOST_PLAIN_STEPS);
@@ -222,6 +233,9 @@ impl Response {
         light: &EchoLight,
         steps: Steps,
     ) -> Vec<Dual<K>> {
+        if let Some(law) = self.other_bins {
+            return law.chances(self, light);
+        }
         let steps = self.steps(light, steps);
         if self.dead.is_plain() {
             self.chances_of_plain(light, steps)
@@ -238,7 +252,8 @@ impl Response {
     ) -> Vec<Vec<Dual<K>>> {
         let some = lights.chunks(LANES);
         let of_some = some.flat_map(|lights| {
-            if self.dead.is_plain() && lights.len() >= WORTH_LANES {
+            let is_ours = self.other_bins.is_none();
+            if is_ours && self.dead.is_plain() && lights.len() >= WORTH_LANES {
                 self.chances_in_lanes(lights, steps)
             } else {
                 let of_light = |light| self.chances_of(light, steps);

@@ -64,8 +64,8 @@ pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histogra
         });
         let counts = counts.collect::<Result<_, _>>()?;
         match captures.last_mut() {
-            Some(capture) if zone == capture.len() => capture.push(counts),
             _ if zone == 0 => captures.push(vec![counts]),
+            Some(capture) if zone == capture.len() => capture.push(counts),
             // Of a capture whose beginning is not in the log.
             _ => captures.push(Vec::new()),
         }

@@ -33,6 +33,7 @@ pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
     };
     // Line by line, for as long as they follow each other.
     let mut lines: Vec<Vec<u32>> = Vec::new();
+    let mut is_lost = false;
     for (number, line) in text.lines().enumerate() {
         let Some(rest) = line.trim().strip_prefix("#Raw,") else {
             continue;
@@ -57,19 +58,28 @@ pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
                 .map_err(|_| complain(format!("has `{cell}`, no byte; {cured}")))
         });
         let bytes: Vec<u32> = bytes.collect::<Result<_, _>>()?;
-        if found.bins == 0 {
-            found.bins = bytes.len();
-        }
-        if index != lines.len() || bytes.len() != found.bins {
-            found.cut_short += usize::from(!lines.is_empty() || index != 0);
+        let goes_on = index == lines.len() && lines.iter().all(|line| line.len() == bytes.len());
+        if !goes_on {
+            // One for all lines of a capture whose beginning is missing.
+            found.cut_short += usize::from(!lines.is_empty() || index != 0 && !is_lost);
+            is_lost = index != 0;
             lines.clear();
-            if index != 0 || bytes.len() != found.bins {
+            if is_lost {
                 continue;
             }
         }
+        is_lost = false;
         lines.push(bytes);
         if lines.len() == LINES {
-            found.captures.push(capture(&lines));
+            let bins = lines[0].len();
+            if found.captures.is_empty() {
+                found.bins = bins;
+            }
+            if bins == found.bins {
+                found.captures.push(capture(&lines));
+            } else {
+                found.cut_short += 1;
+            }
             lines.clear();
         }
     }

@@ -147,8 +147,8 @@ mod tests {
                 let found = detector.agreement(&counts, &expected);
                 low += usize::from(found.p < 0.05);
                 high += usize::from(found.p > 0.95);
-                // A bin too late, and a third of the light too strong.
-                for other in [(place.0 + 1.0, 0.1, 0.2), (place.0, 0.1, 0.27)] {
+                // A bin too late, and twice as much background.
+                for other in [(place.0 + 1.0, 0.1, 0.2), (place.0, 0.1, 0.4)] {
                     let expected = detector.expected(&light(&detector, other));
                     assert!(detector.agreement(&counts, &expected).p < 1e-4, "{other:?}");
                 }
