@@ -97,8 +97,9 @@ pub(crate) fn detector_range<'py>(
 pub(crate) fn detector_expected(
     py: Python<'_>,
     detector: Spelled,
-    (depth_m, photons, background): (f64, f64, f64),
+    light: (f64, f64, f64),
 ) -> Bound<'_, PyArray1<f64>> {
+    let (depth_m, photons, background) = light;
     let light = SurfaceLight {
         depth_m,
         photons,

@@ -278,6 +278,23 @@ fn a_table_is_ranged_and_written() {
     assert!((all.as_f64().unwrap() - some.as_f64().unwrap()).abs() < 0.005);
 }
 
+/// As a public log of a TMF8829 has it, whose logger wrote one histogram of each row in all columns.
+#[test]
+fn histograms_that_a_logger_repeats_are_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (text, _) = table();
+    let line = text.lines().nth(1).unwrap();
+    std::fs::write(folder.join("counts.csv"), format!("{line}\n{line}\n")).unwrap();
+    let words = "range --format counts --histograms counts.csv --bin-width-ns 1 --pulse-fwhm-ns 2";
+    let said = gdtof_words(folder, words);
+    let said = String::from_utf8(said.stderr).unwrap();
+    assert!(
+        said.contains("1 of 2 zones have the counts of the zone before"),
+        "{said}"
+    );
+}
+
 #[test]
 fn what_is_missing_or_impossible_is_said_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();

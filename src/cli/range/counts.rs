@@ -17,6 +17,9 @@ use crate::system::RETURNS;
 /// Full width at half maximum of a Gaussian over its standard deviation.
 const FWHM_PER_SIGMA: f64 = 2.354_820_045;
 
+/// Counts that two histograms do not share by chance.
+const TOO_MANY_FOR_CHANCE: u64 = 200;
+
 /// A zone of a capture.
 #[derive(Serialize)]
 struct Zone {
@@ -68,6 +71,13 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
             "{cut} captures without all histograms are left out, {all} are whole"
         ));
     }
+    let repeated = repeated(&histograms);
+    if repeated > 0 {
+        let all = histograms.histograms().count();
+        note(format_args!(
+            "{repeated} of {all} zones have the counts of the zone before them, each of which has {TOO_MANY_FOR_CHANCE} or more; the logger may have repeated one zone"
+        ));
+    }
     let detector = detector_of(args, histograms.bins)?;
     let zones: Vec<Zone> = (histograms.captures.par_iter().enumerate())
         .map(|(number, capture)| {
@@ -89,6 +99,19 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         return say_json(&serde_json::json!({ "zones": zones }));
     }
     Ok(tell(table(args, &zones))?)
+}
+
+/// Zones whose histogram is that of the zone before them.
+fn repeated(histograms: &Histograms) -> usize {
+    let of_capture = |capture: &ZoneCounts| {
+        let zones: Vec<&[u32]> = capture.counts.chunks_exact(histograms.bins).collect();
+        let is_repeated = |pair: &&[&[u32]]| {
+            pair[0] == pair[1]
+                && pair[0].iter().map(|&n| u64::from(n)).sum::<u64>() >= TOO_MANY_FOR_CHANCE
+        };
+        zones.windows(2).filter(is_repeated).count()
+    };
+    histograms.captures.iter().map(of_capture).sum()
 }
 
 /// The zones of one capture.
