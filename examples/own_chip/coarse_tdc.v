@@ -1,0 +1,83 @@
+// A dToF array of another kind: no P-counter and no window. Each pixel notes the first photon of a laser cycle
+// in one of 32 bins of a CLK period.
+//
+//   SPAD ──> caught ──> synchroniser ──┐ first one
+//            (cleared by STOP)         ├──> histogram[pixel][bin]   count + 1
+//   STOP ──> coarse counter of all ────┘
+//
+// Bin 0 ends with the first rising edge of CLK after STOP, bin k with the k-th one after that. A photon is counted one
+// period later, when the synchroniser shows it. While STOP is high no photon is caught.
+`timescale 1ns / 1fs
+module coarse_tdc #(
+    parameter PIXELS = 256,
+    parameter BINS = 32,
+    parameter BITS = 14
+) (
+    input wire clk,
+    input wire rst,                             // clears all histograms
+    input wire stop,                            // high while the laser fires
+    input wire [PIXELS-1:0] spad,
+    // Readout: bin `read_bin` of pixel `read_pixel`, one CLK period later with `read_valid`.
+    input wire read,
+    input wire [$clog2(PIXELS)-1:0] read_pixel,
+    input wire [$clog2(BINS)-1:0] read_bin,
+    output reg read_valid,
+    output reg [BITS-1:0] read_count
+);
+    localparam TIMES = $clog2(BINS + 2);
+
+    // Rising edges of CLK since STOP, up to one after the last bin.
+    reg [TIMES-1:0] coarse;
+    reg stop_seen;
+    wire begins = stop & ~stop_seen;
+    always @(posedge clk or posedge rst) begin
+        if (rst) begin
+            stop_seen <= 0;
+            coarse <= BINS + 1;
+        end else begin
+            stop_seen <= stop;
+            if (begins) coarse <= 1;
+            else if (coarse != BINS + 1) coarse <= coarse + 1'b1;
+        end
+    end
+
+    // One asynchronous catcher and one synchroniser a pixel.
+    wire [PIXELS-1:0] first;
+    genvar g;
+    generate
+        for (g = 0; g < PIXELS; g = g + 1) begin : pixel
+            reg caught;
+            always @(posedge spad[g] or posedge stop)
+                if (stop) caught <= 0;
+                else caught <= 1;
+            reg [1:0] sync;
+            always @(posedge clk or posedge rst)
+                if (rst) sync <= 2'b11;
+                else if (begins) sync <= {1'b0, caught};
+                else sync <= {sync[0], caught};
+            assign first[g] = sync[0] & ~sync[1];
+        end
+    endgenerate
+
+    reg [BITS-1:0] histogram [0:PIXELS*BINS-1];
+    wire [TIMES-1:0] bin = coarse - 1'b1;
+    integer p;
+    always @(posedge clk or posedge rst) begin
+        if (rst) begin
+            for (p = 0; p < PIXELS * BINS; p = p + 1) histogram[p] <= 0;
+        end else if (coarse != 0 && coarse != BINS + 1 && |first) begin
+            for (p = 0; p < PIXELS; p = p + 1)
+                if (first[p]) histogram[p * BINS + bin] <= histogram[p * BINS + bin] + 1'b1;
+        end
+    end
+
+    always @(posedge clk or posedge rst) begin
+        if (rst) begin
+            read_valid <= 0;
+            read_count <= 0;
+        end else begin
+            read_valid <= read;
+            read_count <= histogram[read_pixel * BINS + read_bin];
+        end
+    end
+endmodule
