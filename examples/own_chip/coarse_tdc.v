@@ -15,7 +15,7 @@ module coarse_tdc #(
 ) (
     input wire clk,
     input wire rst,                             // clears all histograms
-    input wire stop,                            // high while the laser fires
+    input wire stop,                            // high for less than a CLK period, while the laser fires
     input wire [PIXELS-1:0] spad,
     // Readout: bin `read_bin` of pixel `read_pixel`, one CLK period later with `read_valid`.
     input wire read,
@@ -26,23 +26,28 @@ module coarse_tdc #(
 );
     localparam TIMES = $clog2(BINS + 2);
 
+    // High from STOP to the next edge of CLK.
+    reg begins;
+    always @(posedge clk or posedge stop)
+        if (stop) begins <= 1;
+        else begins <= 0;
+
     // Rising edges of CLK since STOP, up to one after the last bin.
     reg [TIMES-1:0] coarse;
-    reg stop_seen;
-    wire begins = stop & ~stop_seen;
     always @(posedge clk or posedge rst) begin
         if (rst) begin
-            stop_seen <= 0;
             coarse <= BINS + 1;
         end else begin
-            stop_seen <= stop;
             if (begins) coarse <= 1;
             else if (coarse != BINS + 1) coarse <= coarse + 1'b1;
         end
     end
 
-    // One asynchronous catcher and one synchroniser a pixel.
-    wire [PIXELS-1:0] first;
+    wire counts = coarse != 0 && coarse != BINS + 1;
+    wire [$clog2(BINS)-1:0] bin = coarse[$clog2(BINS)-1:0] - 1'b1;
+
+    // A pixel: an asynchronous catcher, a synchroniser, and its histogram in one word.
+    wire [BITS-1:0] shown [0:PIXELS-1];
     genvar g;
     generate
         for (g = 0; g < PIXELS; g = g + 1) begin : pixel
@@ -50,26 +55,21 @@ module coarse_tdc #(
             always @(posedge spad[g] or posedge stop)
                 if (stop) caught <= 0;
                 else caught <= 1;
+
             reg [1:0] sync;
+            wire first = sync[0] & ~sync[1];
             always @(posedge clk or posedge rst)
                 if (rst) sync <= 2'b11;
                 else if (begins) sync <= {1'b0, caught};
                 else sync <= {sync[0], caught};
-            assign first[g] = sync[0] & ~sync[1];
+
+            reg [BINS*BITS-1:0] histogram;
+            always @(posedge clk or posedge rst)
+                if (rst) histogram <= 0;
+                else if (counts && first) histogram[bin*BITS +: BITS] <= histogram[bin*BITS +: BITS] + 1'b1;
+            assign shown[g] = histogram[read_bin*BITS +: BITS];
         end
     endgenerate
-
-    reg [BITS-1:0] histogram [0:PIXELS*BINS-1];
-    wire [TIMES-1:0] bin = coarse - 1'b1;
-    integer p;
-    always @(posedge clk or posedge rst) begin
-        if (rst) begin
-            for (p = 0; p < PIXELS * BINS; p = p + 1) histogram[p] <= 0;
-        end else if (coarse != 0 && coarse != BINS + 1 && |first) begin
-            for (p = 0; p < PIXELS; p = p + 1)
-                if (first[p]) histogram[p * BINS + bin] <= histogram[p * BINS + bin] + 1'b1;
-        end
-    end
 
     always @(posedge clk or posedge rst) begin
         if (rst) begin
@@ -77,7 +77,7 @@ module coarse_tdc #(
             read_count <= 0;
         end else begin
             read_valid <= read;
-            read_count <= histogram[read_pixel * BINS + read_bin];
+            read_count <= shown[read_pixel];
         end
     end
 endmodule

@@ -86,12 +86,20 @@ async def read_out(dut) -> np.ndarray:
 
 
 def simulate() -> None:
+    from cocotb_tools.check_results import get_results
     from cocotb_tools.runner import get_runner
 
     OUT.mkdir(parents=True, exist_ok=True)
     runner = get_runner(os.environ.get("SIM", "icarus"))
     runner.build(sources=[HERE / "coarse_tdc.v"], hdl_toplevel="coarse_tdc", build_dir=OUT / "sim", always=True)
-    runner.test(hdl_toplevel="coarse_tdc", test_module="own_chip", test_dir=OUT / "sim", extra_env={"PYTHONPATH": str(HERE), "OWN_CHIP_OUT": str(OUT)})
+    results = runner.test(
+        hdl_toplevel="coarse_tdc",
+        test_module="own_chip",
+        test_dir=OUT / "sim",
+        extra_env={"PYTHONPATH": str(HERE), "OWN_CHIP_OUT": str(OUT)},
+    )
+    if get_results(results)[1]:
+        sys.exit("the chip does not count as its model does")
 
 
 def range_counts() -> None:

@@ -55,7 +55,7 @@ def test_a_chip_of_another_architecture_makes_a_depth_map(tmp_path: Path) -> Non
         return
     words = "range --format counts --histograms out/counts.npy --bin-width-ns 8 --pulse-fwhm-ns 12 --start-ns -1 --counts first --laser-cycles 500 --out depths.csv --quiet"
     subprocess.run([gdtof_command, *words.split()], cwd=tmp_path, check=True)
-    rows = np.genfromtxt(tmp_path / "depths.csv", delimiter=",", skip_header=1, usecols=2)
+    rows = np.genfromtxt(tmp_path / "depths.csv", delimiter=",", skip_header=1, usecols=[2])
     assert np.isfinite(rows).sum() == int(depths[1])
 
 
@@ -84,11 +84,11 @@ BENCH = """
     @cocotb.test()
     async def a_silent_pin_is_named(dut):
         try:
-            await first_edge(dut.DATA_OUT, "DATA_OUT", within_ns=100)
+            await first_edge(dut.STOP, "STOP", within_ns=100)
         except TimeoutError as error:
-            assert "DATA_OUT did not rise within 100 ns" in str(error)
+            assert "STOP did not rise within 100 ns" in str(error)
         else:
-            raise AssertionError("DATA_OUT rose")
+            raise AssertionError("STOP rose")
 """
 
 

@@ -78,7 +78,7 @@ def test_a_replay_of_them_is_the_frame() -> None:
     ("keys", "drawn", "says"),
     [
         ({"spads": 65}, {}, "spads: 65 are no SPADs of a macropixel; give 1 to 64"),
-        ({"fov_deg": 0.0}, {}, "fov_deg: fov_deg = 0.0 is impossible; give 0.1 to 150"),
+        ({"fov_deg": 0.0}, {}, "fov_deg: fov_deg = 0 is impossible; give 0.1 to 150 deg"),
         ({}, {"period_ns": 0.1}, "period_ns: 0.1 ns is no laser period; give 1 to 1e6 ns"),
         ({}, {"laser_cycles": 0}, "laser_cycles: an exposure needs a laser cycle"),
         ({}, {"period_ns": 1e6, "laser_cycles": 100_000}, "laser_cycles: about .* pulses do not fit into memory"),

@@ -19,8 +19,8 @@ class Photons:
 
     time_fs: NDArray[np.int64]
     """When the wire of the SPAD rises, fs after the first laser pulse."""
-    laser_cycle: NDArray[np.uint32]
-    """Its laser cycle; the first one is 0."""
+    laser_cycle: NDArray[np.int64]
+    """Its laser cycle; the first one is 0. 64 bits, so that it can be multiplied by a period in fs."""
     row: NDArray[np.uint16]
     """Row of the macropixel."""
     col: NDArray[np.uint16]
@@ -101,6 +101,7 @@ class Light:
             seed,
             progress,
         )
+        drawn["laser_cycle"] = drawn["laser_cycle"].astype(np.int64)
         pixel = drawn["row"].astype(np.int64) * self.shape[1] + drawn["col"]
         return Photons(**drawn, pixel=pixel)
 

@@ -7,7 +7,7 @@
 ...     await run_together(laser, spads)
 
 Times are kept in whole steps of the simulator. A driver says at its end by how much rounding moved an edge at most. Needs cocotb 2
-(`pip install "gdtof[cocotb]"`). Tried with Icarus and Verilator.
+(`pip install "gdtof[cocotb]"`). Tried with Icarus 11; cocotb 2 needs a Verilator later than 5.006, which was not tried.
 """
 
 from __future__ import annotations
@@ -119,7 +119,8 @@ class SpadPins(_Edges):
         masks = [1 << bit for bit in bits.tolist()]
         order = np.argsort(times, kind="stable")
         # A SPAD that fires again as its pulse ends stays high.
-        level, high, values = 0, {}, []
+        high: dict[int, int] = {}
+        level, values = 0, []
         for edge in order.tolist():
             rises = edge < len(masks)
             mask = masks[edge % len(masks)]
