@@ -1,6 +1,7 @@
 //! `gdtof frame`: the main job.
 
-pub(super) mod pair;
+pub(super) mod calibration;
+mod pair;
 mod table;
 
 use std::path::PathBuf;

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use toml::Table;
 
-use super::frame::pair;
+use super::frame::calibration;
 use crate::chip::{Exposure, SensorConfig, Silicon, hslidar_delay_line, macropixel};
 use crate::files::{
     Journal, JournalReader, MANIFEST, Raster, ResultSet, journal_line, parse_json, read_counts,
@@ -96,7 +96,7 @@ pub const READERS: &[(&str, Reader)] = &[
     ("bin_profile", |path| {
         said(read_calibration(path, &DELAY_LINES))
     }),
-    ("pair", |path| said(pair::read_calibration(path))),
+    ("pair", |path| said(calibration::read_calibration(path))),
     ("frame", |path| {
         beside(path, "frame.json", |folder| {
             let mut counts = Vec::new();

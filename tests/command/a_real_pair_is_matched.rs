@@ -123,6 +123,35 @@ fn a_pair_stands_in_for_a_scene() {
     assert!(text.contains("the pair's own depths"), "{text}");
 }
 
+/// The same camera in the files of two data sets.
+#[test]
+fn calibrations_of_data_sets_are_taken_as_they_come() {
+    let here = pair();
+    let middlebury = "cam0=[300 0 80; 0 300 60; 0 0 1]\ncam1=[300 0 80; 0 300 60; 0 0 1]\ndoffs=0\nbaseline=1000\nwidth=160\nheight=120\nndisp=32\n";
+    let projection = |fourth: i32| format!("300 0 80 {fourth} 0 300 60 0 0 0 1 0");
+    let kitti = format!("P2: {}\nP3: {}\n", projection(15), projection(-285));
+    let taken = |text: &str| {
+        std::fs::write(here.path().join("calib.toml"), text).unwrap();
+        let with_truth = [&FRAME[..], &["--truth", "truth.npy", "--json"]].concat();
+        json(&gdtof(here.path(), &with_truth))["macropixels"].clone()
+    };
+    let ours = taken(CALIBRATION);
+    assert_eq!(taken(middlebury), ours);
+    // KITTI's does not say how many disparities to search, so that some are found elsewhere.
+    let others = taken(&kitti);
+    let guided = |of: &serde_json::Value| of[36]["guide_m"].as_f64().unwrap();
+    assert!((guided(&others) - guided(&ours)).abs() < 0.1);
+    std::fs::write(
+        here.path().join("calib.toml"),
+        middlebury.replace("160", "320"),
+    )
+    .unwrap();
+    let refused = gdtof(here.path(), &FRAME);
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.contains("320 x 120 pixels"), "{said}");
+}
+
 #[test]
 fn disparities_are_found_and_held_against_the_truth() {
     let here = pair();

@@ -11,18 +11,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use glam::DMat3;
 use serde::Serialize;
 
+use super::calibration::read_calibration;
 use crate::chip::SensorConfig;
 use crate::cli::stereo::{Errors, TruthArgs, cannot_match, disparity_picture, read_image};
-use crate::files::{InputError, Raster, parse_toml};
+use crate::files::{InputError, Raster};
 use crate::guide::{Guide, GuideInput, MatchedPair};
 use crate::report::{Table, write_npy_f32};
-use crate::scene::{
-    DVec3, DepthMap, GroundTruth, MOST_BASELINE_M, MapFiles, Object, PinholeCamera, Scene, Shape,
-};
-use crate::settings::Document;
+use crate::scene::{DVec3, DepthMap, GroundTruth, MapFiles, Object, PinholeCamera, Scene, Shape};
 use crate::stereo::{DisparityMap, Matcher};
 
 /// Standard deviation that is claimed for a disparity, px: half of all errors on the Motorcycle pair are below 0.15 px, as with 0.22 px, and tails are
@@ -40,33 +37,13 @@ pub(super) struct PairArgs {
     /// Right picture of that pair (PNG).
     #[arg(long, value_name = "FILE", requires = "left")]
     right: Option<PathBuf>,
-    /// Calibration of that pair (TOML): left and right (3x3 intrinsics, px) and baseline_m; optionally disparities,
-    /// min_disparity, lidar_position_m (from the left camera) and lidar_fov_deg.
+    /// Calibration of that pair: a calib.txt of Middlebury or KITTI, or TOML with left and right (3x3 intrinsics, px) and baseline_m; optionally
+    /// disparities, min_disparity, lidar_position_m (from the left camera) and lidar_fov_deg.
     #[arg(long, value_name = "FILE", requires = "left")]
     calib: Option<PathBuf>,
     /// The light is computed from the truth; without one from the pair's own depths.
     #[command(flatten)]
     truth: TruthArgs,
-}
-
-/// What a calibration file holds.
-#[derive(Debug, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::cli) struct Calibration {
-    left: [[f64; 3]; 3],
-    right: Option<[[f64; 3]; 3]>,
-    baseline_m: f64,
-    disparities: Option<usize>,
-    min_disparity: Option<i32>,
-    lidar_position_m: Option<DVec3>,
-    lidar_fov_deg: Option<f64>,
-}
-
-/// Focal length and principal point, px.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::cli) struct Intrinsics {
-    focal_px: f64,
-    principal_px: (f64, f64),
 }
 
 /// The pair in place of a scene.
@@ -117,6 +94,18 @@ impl PairArgs {
         let complain = |message: String| InputError::new(calib_path.display(), message);
         let (calibration, [own, other]) = read_calibration(calib_path)?;
         let (left, right) = (read_image(left_path)?, read_image(right_path)?);
+        let size = (left.width(), left.height());
+        if let Some(whole) = calibration.size_px.filter(|whole| *whole != size) {
+            let message = format!(
+                "is of pictures of {} x {} pixels, and {} has {} x {}; give pictures of that size",
+                whole.0,
+                whole.1,
+                left_path.display(),
+                size.0,
+                size.1
+            );
+            return Err(complain(message));
+        }
         let default = Matcher::default();
         let matcher = Matcher {
             disparities: calibration.disparities.unwrap_or(default.disparities),
@@ -233,75 +222,6 @@ impl PairReport {
         self.disparity_errors.is_none().then_some(
             "Light comes from the depths that the pair itself has matched: errors of the guide are in both and are not seen. --truth gives other light.",
         )
-    }
-}
-
-/// What a calibration file holds, and the intrinsics of left and right camera, px.
-///
-/// # Errors
-/// A file that cannot be read, or whose pair is impossible.
-pub(in crate::cli) fn read_calibration(
-    path: &Path,
-) -> Result<(Calibration, [Intrinsics; 2]), InputError> {
-    let complain = |message: String| InputError::new(path.display(), message);
-    let calibration: Calibration = parse_toml(path.display(), &Document::text(path)?)?;
-    let own = intrinsics("left", calibration.left).map_err(complain)?;
-    let other = match calibration.right {
-        Some(right) => intrinsics("right", right).map_err(complain)?,
-        None => own,
-    };
-    check(&calibration, own, other).map_err(complain)?;
-    Ok((calibration, [own, other]))
-}
-
-fn intrinsics(name: &str, matrix: [[f64; 3]; 3]) -> Result<Intrinsics, String> {
-    let columns = DMat3::from_cols_array_2d(&matrix);
-    let [[fx, skew, u], [zero, fy, v], last] = matrix;
-    if !matrix.iter().flatten().all(|x| x.is_finite()) || columns.determinant().abs() < 1e-9 {
-        return Err(format!(
-            "the {name} intrinsics {matrix:?} are singular; give [[f, 0, u], [0, f, v], [0, 0, 1]] in pixels"
-        ));
-    }
-    let plain = fx > 0.0 && skew == 0.0 && zero == 0.0 && last == [0.0, 0.0, 1.0];
-    if !plain || (fy / fx - 1.0).abs() > 0.01 {
-        return Err(format!(
-            "the {name} intrinsics {matrix:?} are not those of a rectified camera with square pixels; give [[f, 0, u], [0, f, v], [0, 0, 1]]"
-        ));
-    }
-    Ok(Intrinsics {
-        focal_px: fx,
-        principal_px: (u, v),
-    })
-}
-
-fn check(calibration: &Calibration, left: Intrinsics, right: Intrinsics) -> Result<(), String> {
-    // The thesis's rig has 1 m; files in millimetres have a hundred and more.
-    if !(calibration.baseline_m > 0.0 && calibration.baseline_m <= MOST_BASELINE_M) {
-        let baseline_m = calibration.baseline_m;
-        return Err(format!(
-            "baseline_m = {baseline_m} is impossible; give metres above 0, up to {MOST_BASELINE_M} (193 mm are 0.193)"
-        ));
-    }
-    if (right.focal_px / left.focal_px - 1.0).abs() > 1e-3 {
-        return Err(
-            "focal lengths differ by more than a thousandth; give those of the rectified pair"
-                .into(),
-        );
-    }
-    if (right.principal_px.1 - left.principal_px.1).abs() > 1.0 {
-        return Err("principal points are not in one row; give those of the rectified pair".into());
-    }
-    let place = calibration.lidar_position_m.unwrap_or(DVec3::ZERO);
-    if !(place.is_finite() && place.length() <= 1e3) {
-        return Err(format!(
-            "lidar_position_m = {place} is impossible; give metres, up to 1000"
-        ));
-    }
-    match calibration.lidar_fov_deg {
-        Some(fov) if !(fov > 0.0 && fov < 180.0) => Err(format!(
-            "lidar_fov_deg = {fov} is impossible; give degrees above 0, below 180"
-        )),
-        _ => Ok(()),
     }
 }
 
