@@ -124,7 +124,8 @@ def photons(draw: st.DrawFn, sensor: Sensor, stop_periods: int, laser_cycles: in
     edges = st.tuples(half_periods, st.integers(-100_000, 100_000))
     at_edges = edges.map(lambda edge: min(max(int(edge[0] * period_fs / 2) + edge[1], 0), end_fs - 1))
     times: list[int] = draw(st.lists(st.one_of(anywhere, at_edges), max_size=most))
-    if times and draw(st.booleans()):
+    is_burst = draw(st.booleans())
+    if times and is_burst:
         # A burst: all SPADs that there are, one after the other.
         times += [min(times[0] + 1000 * number, end_fs - 1) for number in range(min(spads, most))]
     which = [(draw(st.integers(0, pixels - 1)), draw(st.integers(0, spads - 1))) for _ in times]
