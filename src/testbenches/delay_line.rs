@@ -14,7 +14,7 @@ use crate::chip::{
     Exposure, Probe, Sensor, SensorConfig, SensorPins, WindowLaw, array, hslidar_delay_line, probes,
 };
 use crate::engine::GateSimulation;
-use crate::engine::waveform::write_waves;
+use crate::engine::waveform::{hits, write_waves};
 use crate::files::InputError;
 use crate::kernel::Recorder;
 use crate::photon::SpadEvent;
@@ -179,7 +179,7 @@ fn view(sensor: &Sensor, exposure: &Exposure, origin: Time) -> Layout {
             Entry::binary(taps.path(&name)),
             Entry::binary(Probe::SampleClk.path(&name)),
             Entry::binary(Probe::Strobe.path(&name)),
-            Entry::binary(Probe::Hit.path(&name)),
+            hits(Probe::Hit.path(&name), sensor.bins),
         ];
         let bins = (0..sensor.bins).map(|bin| Entry::decimal(probes::bin_path(&name, bin)));
         groups.push(Group::new(

@@ -384,7 +384,10 @@ fn view(config: &SensorConfig, (start, end): (Time, Time)) -> Layout {
     let mut groups = vec![Group::new("Load path (Fig. 57)", shared)];
     for row in 0..config.rows {
         let load = Probe::MemoryLoad.path(&load_path::memory_name(row, 0));
-        let memories = (0..config.cols).map(|col| Entry::decimal(probes::memory_path(row, col)));
+        let memories = (0..config.cols).map(|col| {
+            let memory = Entry::decimal(probes::memory_path(row, col));
+            memory.named(format!("MEMORY of column {col}"))
+        });
         groups.push(Group::new(
             format!("Row {row}, columns 0 to {}", config.cols - 1),
             [Entry::binary(load)].into_iter().chain(memories),

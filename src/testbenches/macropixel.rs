@@ -18,7 +18,7 @@ use crate::chip::{
     array, correlation, histogram, probes,
 };
 use crate::engine::GateSimulation;
-use crate::engine::waveform::write_waves;
+use crate::engine::waveform::{hits, write_waves};
 use crate::files::InputError;
 use crate::kernel::Recorder;
 use crate::netlist::Netlist;
@@ -27,7 +27,7 @@ use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::testbenches::testbench::GivenSensor;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout, mark};
+use crate::waves::{Entry, Group, Layout, Mark};
 
 /// Start values of Fig. 48's two macropixels, three bins apart.
 const FIG_48: [u16; 2] = [52, 49];
@@ -338,7 +338,7 @@ fn view(
             Entry::decimal(Probe::CounterOut.path(&pixel)),
             Entry::binary(Probe::LocalStop.path(&pixel)),
             Entry::binary(Probe::Shift.path(&pixel)),
-            Entry::binary(Probe::Hit.path(&pixel)),
+            hits(Probe::Hit.path(&pixel), config.bins),
             // Of a counter TDC.
             Entry::decimal(Probe::Code.path(&pixel)),
             Entry::decimal(Probe::Events.path(&pixel)),
@@ -350,12 +350,18 @@ fn view(
         };
         let bins = bins.into_iter();
         let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
-        // GTKWave widens its column of names for a longer title.
-        let first = usize::from(start - starts[1]) * config.step_periods;
-        let [from, until] = [first, first + config.bins].map(mark);
         groups.push(Group::new(
-            format!("Macropixel {}: {start} ({figure}), {from}-{until}", col + 1),
+            format!("Macropixel {}: start value {start} ({figure})", col + 1),
             signals.into_iter().filter(is_there).chain(bins),
+        ));
+    }
+    let mut marks = vec![Mark::new(origin, "STOP")];
+    for start in starts {
+        let first = usize::from(start - starts[1]) * config.step_periods;
+        marks.push(Mark::new(edges[first], format!("{start} begins")));
+        marks.push(Mark::new(
+            edges[first + config.bins],
+            format!("{start} ends"),
         ));
     }
     let shown = match edges[..] {
@@ -367,7 +373,7 @@ fn view(
         groups,
         zoom: (shown.0 - Time::from_ns(5), shown.1),
         marker: Some(origin),
-        marks: edges,
+        marks,
     }
 }
 

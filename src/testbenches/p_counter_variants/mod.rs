@@ -34,7 +34,7 @@ use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Group, Layout, Mark};
 
 /// The first scene: a start value with its most significant bit high.
 const HIGH: Scene = Scene {
@@ -264,9 +264,10 @@ impl Bench {
         }
         Layout {
             groups,
-            zoom: (Time::ZERO, self.at(HIGH.end() + 10)),
+            // About the second STOP, where counters that go on or reset show how they differ.
+            zoom: (self.at(HIGH.stop(1) - 16), self.at(HIGH.stop(1) + 40)),
             marker: Some(self.at(HIGH.stop(1))),
-            marks: Vec::new(),
+            marks: vec![Mark::new(self.at(HIGH.stop(1)), "STOP")],
         }
     }
 

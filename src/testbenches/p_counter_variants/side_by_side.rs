@@ -168,7 +168,10 @@ fn view(netlist: &Netlist, end: Time) -> Layout {
         let shown = shown
             .into_iter()
             .filter(|&probe| probes.find(probe).is_some());
-        let shown = shown.map(|probe| Entry::binary(probes.path(probe)));
+        let shown = shown.map(|probe| match probe {
+            Probe::Memory | Probe::CounterOut => Entry::decimal(probes.path(probe)),
+            _ => Entry::binary(probes.path(probe)),
+        });
         let name = format!("P-counter {}", p_counter.name());
         groups.push(Group::new(name, shown.chain(own)));
     }

@@ -12,11 +12,13 @@ use crate::kernel::{Drive, Kernel, Stimulus};
 use crate::netlist::ModuleBuilder;
 use crate::report::Checks;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Group, Layout, Mark};
+
+/// From one interval's beginning to the next one's.
+const SLOT: Time = Time::from_ns(40);
 
 /// Three intervals in all converters at once.
 pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    const SLOT: Time = Time::from_ns(40);
     let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
     let intervals = [
         Time::from_ps(600),
@@ -102,6 +104,11 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     Ok(())
 }
 
+/// When an interval begins.
+fn begin(slot: i64) -> Time {
+    SLOT * slot + BEGIN
+}
+
 fn view() -> Layout {
     let group = |title: &str, entries: &[Entry]| Group::new(title, entries.iter().cloned());
     Layout {
@@ -131,8 +138,11 @@ fn view() -> Layout {
                 &[Entry::hex("line.TAP"), Entry::hex("line.SEEN")],
             ),
         ],
-        zoom: (BEGIN - Time::from_ns(2), BEGIN + Time::from_ns(4)),
-        marker: Some(BEGIN),
-        marks: Vec::new(),
+        // The third interval, in which all of them count.
+        zoom: (begin(2) - Time::from_ns(2), begin(2) + Time::from_ns(22)),
+        marker: Some(begin(2)),
+        marks: [0, 1, 2]
+            .map(|slot| Mark::new(begin(slot), format!("interval {}", slot + 1)))
+            .to_vec(),
     }
 }

@@ -10,7 +10,7 @@
 
 use std::io::{self, Write};
 
-use super::layout::{Layout, MARKS, Radix, Shape, one_line};
+use super::layout::{Layout, MARKS, Radix, Shape, mark, one_line};
 use crate::Origin;
 use crate::netlist::Netlist;
 use crate::units::Time;
@@ -76,11 +76,17 @@ impl Layout {
         writeln!(out, "[pos] -1 -1")?;
         let marker = self.marker.map_or(-1, Time::as_fs);
         // After the primary marker come the lettered ones.
-        let marks = self.marks.iter().map(|mark| mark.as_fs());
+        let marks = self.marks.iter().map(|mark| mark.time.as_fs());
         let lettered = marks.chain(std::iter::repeat(-1)).take(MARKS);
         let lettered: String = lettered.map(|fs| format!(" {fs}")).collect();
         let zoom = self.zoom_level(names_width);
         writeln!(out, "*{zoom:.6} {marker}{lettered}")?;
+        for (place, named) in self.marks.iter().take(MARKS).enumerate() {
+            one_line(&named.name)?;
+            if !named.name.is_empty() {
+                writeln!(out, "[markername] {}{}", mark(place), named.name)?;
+            }
+        }
         for scope in self.open_scopes(top) {
             writeln!(out, "[treeopen] {scope}.")?;
         }
@@ -93,7 +99,12 @@ impl Layout {
             for entry in &group.signals {
                 let range = Shape::of(netlist, &entry.path)?.range();
                 let flags = entry.radix.flags();
-                writeln!(out, "{flags}\n{top}.{}{range}", entry.path)?;
+                writeln!(out, "{flags}")?;
+                if let Some(alias) = &entry.alias {
+                    one_line(alias)?;
+                    write!(out, "+{{{alias}}} ")?;
+                }
+                writeln!(out, "{top}.{}{range}", entry.path)?;
             }
             writeln!(out, "@1000200\n-{}", group.title)?;
         }
@@ -109,7 +120,9 @@ impl Layout {
             for entry in &group.signals {
                 let shape = Shape::of(netlist, &entry.path)?;
                 let last = entry.path.rsplit('.').next().unwrap_or_default();
-                name = name.max(last.len() + shape.range().len());
+                let own = last.len() + shape.range().len();
+                let alias = entry.alias.as_ref().map(|alias| alias.chars().count());
+                name = name.max(alias.unwrap_or(own));
                 value = value.max(shape.digits(entry.radix));
             }
         }
@@ -162,7 +175,8 @@ mod tests {
 [pos] -1 -1
 *-18.395516 2000000 1000000 2500000"#,
             " -1".repeat(24),
-            r#"[treeopen] top.
+            r#"[markername] ASTOP
+[treeopen] top.
 [treeopen] top.inner.
 [sst_width] 220
 [signals_width] 120
@@ -172,7 +186,7 @@ mod tests {
 @22
 top.DATA[1:0]
 @28
-top.inner.BITS[1:0]
++{bits, bit 1 first} top.inner.BITS[1:0]
 @1000200
 -Inputs
 @800200

@@ -29,6 +29,8 @@ pub struct Entry {
     pub path: String,
     /// How to show it.
     pub radix: Radix,
+    /// What GTKWave calls it instead of its own name. Surfer shows its own name.
+    pub alias: Option<String>,
 }
 
 impl Entry {
@@ -49,7 +51,20 @@ impl Entry {
 
     fn new(path: impl Into<String>, radix: Radix) -> Self {
         let path = path.into();
-        Entry { path, radix }
+        Entry {
+            path,
+            radix,
+            alias: None,
+        }
+    }
+
+    /// The same under another name.
+    #[must_use]
+    pub fn named(self, alias: impl Into<String>) -> Self {
+        Entry {
+            alias: Some(alias.into()),
+            ..self
+        }
     }
 }
 
@@ -82,7 +97,24 @@ pub struct Layout {
     /// Where the marker stands.
     pub marker: Option<Time>,
     /// Further instants, marked with the letters from A on ([`mark`]); 26 at most are shown.
-    pub marks: Vec<Time>,
+    pub marks: Vec<Mark>,
+}
+
+/// A marked instant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mark {
+    /// When it is.
+    pub time: Time,
+    /// What it is, one line, which GTKWave shows in the place of its letter. Empty: the letter alone.
+    pub name: String,
+}
+
+impl Mark {
+    /// A mark with a name.
+    pub fn new(time: Time, name: impl Into<String>) -> Self {
+        let name = name.into();
+        Mark { time, name }
+    }
 }
 
 /// Marks that a viewer has.
@@ -169,13 +201,22 @@ pub(super) mod sample {
             groups,
             zoom: (Time::from_ns(1), Time::from_ns(3)),
             marker: Some(Time::from_ns(2)),
-            marks: vec![Time::from_ns(1), Time::from_ps(2_500)],
+            marks: vec![
+                Mark::new(Time::from_ns(1), "STOP"),
+                Mark::new(Time::from_ps(2_500), ""),
+            ],
         }
     }
 
     pub fn groups() -> Vec<Group> {
         vec![
-            Group::new("Inputs", [Entry::hex("DATA"), Entry::binary("inner.BITS")]),
+            Group::new(
+                "Inputs",
+                [
+                    Entry::hex("DATA"),
+                    Entry::binary("inner.BITS").named("bits, bit 1 first"),
+                ],
+            ),
             Group::new("Results", [Entry::decimal("inner.ONE"), Entry::binary("Z")]),
         ]
     }

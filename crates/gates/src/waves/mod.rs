@@ -43,7 +43,7 @@ mod vcd;
 mod writer;
 
 pub use fst::{Fst, FstWriter};
-pub use layout::{Entry, Group, Layout, Radix, mark};
+pub use layout::{Entry, Group, Layout, Mark, Radix, mark};
 pub use saif::write_saif;
 pub use selection::Selection;
 pub use vcd::{Vcd, VcdWriter};

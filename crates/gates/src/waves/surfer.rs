@@ -78,8 +78,8 @@ impl Layout {
         if let Some(marker) = self.marker {
             writeln!(out, "cursor_set {}", marker.as_fs())?;
         }
-        for (place, time) in self.marks.iter().take(MARKS).enumerate() {
-            writeln!(out, "marker_set {} {}", mark(place), time.as_fs())?;
+        for (place, named) in self.marks.iter().take(MARKS).enumerate() {
+            writeln!(out, "marker_set {} {}", mark(place), named.time.as_fs())?;
         }
         Ok(out)
     }

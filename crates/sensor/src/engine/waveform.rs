@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::gate::GateSimulation;
 use super::{Replay, Window};
-use crate::chip::window_law::WindowLaw;
+use crate::chip::window_law::{OpenWindow, WindowLaw};
 use crate::chip::{Exposure, LoadProbe, Probe, Probes, SensorConfig};
 use crate::files::InputError;
 use crate::kernel::Observer;
@@ -15,7 +15,7 @@ use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
 use crate::photon::SpadEvent;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout, Selection, WaveFile, WaveFormat, write_views};
+use crate::waves::{Entry, Group, Layout, Mark, Selection, WaveFile, WaveFormat, write_views};
 
 /// CLK periods that a view shows before its marker, and after: the end of a window, and what becomes of it.
 const SHOWN_PERIODS: (i64, i64) = (18, 4);
@@ -121,6 +121,9 @@ pub struct View {
     pixels: Vec<(usize, usize)>,
     /// Where the first window of the first of them closes: the marker, if none hits.
     closing: Time,
+    /// The law of the first of them and its window, whose ends are marked.
+    law: WindowLaw,
+    window: Option<OpenWindow>,
     /// What is shown before and after the marker.
     around: (Time, Time),
     /// From when to when changes are kept; from power-up if the beginning is not after the first rising edge of STOP.
@@ -137,11 +140,14 @@ impl View {
         exposure: &Exposure,
         start: u16,
     ) -> Self {
-        let window = WindowLaw::new(config, exposure).window(start).open();
+        let law = WindowLaw::new(config, exposure);
+        let window = law.window(start).open();
         let (before, after) = SHOWN_PERIODS;
         View {
             pixels,
             closing: window.map_or(Time::ZERO, |open| open.strobe_cause),
+            law,
+            window,
             around: (
                 exposure.clock.periods(before),
                 exposure.clock.periods(after),
@@ -149,6 +155,29 @@ impl View {
             kept: Time::ZERO..=Time::MAX,
             is_part: false,
         }
+    }
+
+    /// STOP, the ends of the window and the strobe in the laser cycle in which the marker stands, `marker` after the first STOP edge.
+    /// Of another macropixel than the first STOP alone is known.
+    fn marks(&self, origin: Time, (pixel, marker): ((usize, usize), Time)) -> Vec<Mark> {
+        let exposure = self.law.exposure();
+        let cycles = (0..i64::from(exposure.laser_cycles)).rev();
+        let cycle = { cycles }.find(|&cycle| exposure.stop(cycle) <= marker);
+        let cycle = cycle.unwrap_or(0);
+        let stop = exposure.stop(cycle);
+        let mut marks = vec![Mark::new(origin + stop, "STOP")];
+        if let Some(window) = self.window.filter(|_| pixel == self.pixels[0]) {
+            let bins = self.law.sensor().bins as i64;
+            let edge = |bin: i64| self.law.bin_interval(&window, cycle, bin).start;
+            for (time, name) in [
+                (edge(0), "window begins"),
+                (edge(bins), "window ends"),
+                (stop + window.strobe_cause, "strobe"),
+            ] {
+                marks.push(Mark::new(origin + time, name));
+            }
+        }
+        marks
     }
 
     /// What is to be kept of one macropixel with its start value and SPAD pulses (in order of time).
@@ -231,7 +260,7 @@ pub fn record(
         groups: groups(&netlist, pixel),
         zoom: (marker - view.around.0, marker + view.around.1),
         marker: Some(marker),
-        marks: Vec::new(),
+        marks: view.marks(origin, (pixel, marker - origin)),
     };
     write_views(&layout, waves, &netlist, *span.end())
 }
@@ -292,6 +321,11 @@ pub fn write_waves(
     write_views(layout, waves, netlist, end)
 }
 
+/// HIT, with the order of its bits in its name.
+pub fn hits(path: impl Into<String>, bins: usize) -> Entry {
+    Entry::binary(path).named(format!("HIT, bin {} to 0", bins - 1))
+}
+
 /// The signals of the macropixel (row, col), and the load path.
 fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
     let probes = Probes::of_macropixel(netlist, row, col);
@@ -322,7 +356,10 @@ fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
         (Probe::OddTap, binary(Probe::OddTap)),
         (Probe::SampleClk, binary(Probe::SampleClk)),
         (Probe::Strobe, binary(Probe::Strobe)),
-        (Probe::Hit, binary(Probe::Hit)),
+        (
+            Probe::Hit,
+            hits(probes.path(Probe::Hit), probes.bins().len()),
+        ),
         (Probe::Start, binary(Probe::Start)),
         (Probe::Counting, binary(Probe::Counting)),
         (Probe::Code, decimal(Probe::Code)),
