@@ -358,10 +358,10 @@ fn view(
     let mut marks = vec![Mark::new(origin, "STOP")];
     for start in starts {
         let first = usize::from(start - starts[1]) * config.step_periods;
-        marks.push(Mark::new(edges[first], format!("{start} begins")));
+        marks.push(Mark::new(edges[first], format!("{start} on")));
         marks.push(Mark::new(
             edges[first + config.bins],
-            format!("{start} ends"),
+            format!("{start} off"),
         ));
     }
     let shown = match edges[..] {

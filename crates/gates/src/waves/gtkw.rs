@@ -173,13 +173,13 @@ mod tests {
 [timestart] 1000000
 [size] 1600 900
 [pos] -1 -1
-*-18.395516 2000000 1000000 2500000"#,
+*-18.477393 2000000 1000000 2500000"#,
             " -1".repeat(24),
             r#"[markername] ASTOP
 [treeopen] top.
 [treeopen] top.inner.
 [sst_width] 220
-[signals_width] 120
+[signals_width] 184
 [sst_expanded] 1
 @800200
 -Inputs

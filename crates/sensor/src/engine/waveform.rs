@@ -256,11 +256,18 @@ pub fn record(
     file.finish(end)?;
     let found = first_hit.found.filter(|(time, _)| span.contains(time));
     let (marker, pixel) = found.unwrap_or((origin + view.closing, view.pixels[0]));
+    let marks = view.marks(origin, (pixel, marker - origin));
+    // The whole window, where it is known.
+    let begins = marks.get(1).map_or(marker, |mark| mark.time);
+    let period = view.law.exposure().clock.periods(1);
     let layout = Layout {
         groups: groups(&netlist, pixel),
-        zoom: (marker - view.around.0, marker + view.around.1),
+        zoom: (
+            (marker - view.around.0).min(begins - period),
+            marker + view.around.1,
+        ),
         marker: Some(marker),
-        marks: view.marks(origin, (pixel, marker - origin)),
+        marks,
     };
     write_views(&layout, waves, &netlist, *span.end())
 }
