@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Direct dependencies, how many crates each alone draws in, what these take to build, and why it stays: the table of docs/src/hardened.md.
+"""Direct dependencies, how many crates each alone draws in, what these take to build, and why it stays: the table of docs/robustness.md.
 
     python3 benches/dependencies.py
 

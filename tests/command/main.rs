@@ -52,6 +52,7 @@ mod scenes_name_files;
 mod silicon_replays;
 mod sweeps_go_on;
 mod the_book_lists_every_key;
+mod the_book_reads_plainly;
 mod the_book_runs;
 mod the_command_explains_itself;
 mod the_same_everywhere;

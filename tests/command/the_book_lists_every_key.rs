@@ -13,7 +13,7 @@ use guided_dtof::system::WindowPolicy;
 
 const HEAD: &str = "# Keys
 
-All that can be set, with its unit, range and source. `gdtof sensor` and `gdtof scene` print the same with the values of a sensor or scene.
+Every key that you can set, with its unit, range and source. `gdtof sensor` and `gdtof scene` print the same keys with the values of a sensor or scene.
 ";
 
 fn table(title: &str, what: &str, keys: &[Key]) -> String {

@@ -342,12 +342,12 @@ impl Function {
     }
 }
 
-/// The table of all functions, the same for the book, and whether every one keeps its promise.
+/// The table of all functions, the same for `docs/robustness.md`, and whether every one keeps its promise.
 fn table() -> (Grid, String, bool) {
     let mut grid = Grid::new([
         "function", "range", "cases", "error", "worst", "promised", "at",
     ]);
-    let mut book = "| function | range | references | error | worst | promised |\n|---|---|---:|---|---:|---:|\n".to_owned();
+    let mut rows = "| function | range | references | error | worst | promised |\n|---|---|---:|---|---:|---:|\n".to_owned();
     let mut kept = true;
     for function in functions() {
         let worst = function.worst();
@@ -365,7 +365,7 @@ fn table() -> (Grid, String, bool) {
             },
             Worst { cases, error, .. },
         ) = (&function, &worst);
-        book +=
+        rows +=
             &format!("| {name} | {range} | {cases} | {measure} | {error:.0e} | {promise:.0e} |\n");
         grid.push([
             function.name.to_owned(),
@@ -377,10 +377,10 @@ fn table() -> (Grid, String, bool) {
             worst.at,
         ]);
     }
-    (grid, book, kept)
+    (grid, rows, kept)
 }
 
-/// What the book's table says but for the worst errors, whose last digit is this machine's.
+/// What the table of `docs/robustness.md` says but for the worst errors, whose last digit is this machine's.
 fn promises(table: &str) -> Vec<Vec<&str>> {
     let rows = table.lines().filter(|line| !line.starts_with("|--"));
     let rows = rows.map(|line| line.split(" | ").collect());
@@ -388,19 +388,19 @@ fn promises(table: &str) -> Vec<Vec<&str>> {
         .collect()
 }
 
-/// Set GDTOF_REMAKE to write the book's table anew (`vectors/remake.sh` does).
+/// Set GDTOF_REMAKE to write the table anew (`vectors/remake.sh` does).
 #[test]
 fn every_function_keeps_its_promise() {
     let (table, rows, kept) = table();
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/src/hardened.md");
-    let mut book = std::fs::read_to_string(path).unwrap();
-    let start = book.find("| function | range |").expect("a table");
-    let end = start + book[start..].find("\n\n").expect("an end of it") + 1;
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/robustness.md");
+    let mut document = std::fs::read_to_string(path).unwrap();
+    let start = document.find("| function | range |").expect("a table");
+    let end = start + document[start..].find("\n\n").expect("an end of it") + 1;
     if std::env::var_os("GDTOF_REMAKE").is_some() {
-        book.replace_range(start..end, &rows);
-        std::fs::write(path, book).unwrap();
+        document.replace_range(start..end, &rows);
+        std::fs::write(path, document).unwrap();
     } else {
-        assert_eq!(promises(&book[start..end]), promises(&rows));
+        assert_eq!(promises(&document[start..end]), promises(&rows));
     }
     println!("{table}");
     assert!(
