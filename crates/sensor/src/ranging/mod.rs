@@ -6,6 +6,7 @@ mod counting;
 mod dead_times;
 mod expected;
 mod finder;
+mod known_chances;
 mod likelihood;
 mod peak;
 mod place;
