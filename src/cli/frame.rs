@@ -18,7 +18,7 @@ use crate::engine::waveform::WaveCycles;
 use crate::files::{InputError, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
-use crate::request::{FrameReport, FrameRequest, write_frame};
+use crate::request::{FrameReport, FrameRequest};
 use crate::system::{Probe, WindowPolicy, take_frame_by};
 use crate::waves::WaveFormat;
 
@@ -124,8 +124,7 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
     let pair_report = pair.as_ref().map(|pair| &pair.report);
     let name = scene_name(args);
     let report = FrameReport::new(name, &request, &settings, &timing, &frame, pair_report);
-    let text = serde_json::to_string(&report)?;
-    write_frame(results.staging(), &text, &frame.histograms)?;
+    report.write(results.staging(), &frame.histograms)?;
     if args.page {
         let page = Page::of(results.staging(), &args.out, 1)?;
         page.write(&results.staging().join("page.html"))?;

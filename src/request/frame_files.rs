@@ -207,32 +207,45 @@ impl<'a, P> FrameReport<'a, P> {
     }
 }
 
-/// Writes frame.json, histograms.npy and depth.png into `out`: `report` is a [`FrameReport`] as JSON, `histograms` are rows x cols x bins.
+impl<P: Serialize> FrameReport<'_, P> {
+    /// Writes frame.json, histograms.npy and depth.png into `out`: `histograms` are rows x cols x bins.
+    ///
+    /// # Errors
+    /// When they cannot be written, or there are fewer or more counts than macropixels have.
+    pub fn write(&self, out: &Path, histograms: &[u16]) -> Result<(), InputError> {
+        let text = serde_json::to_string(self).expect("numbers and words");
+        let exposed = &self.configuration.exposed;
+        let drawn = Drawn {
+            mode: exposed.sensor.mode,
+            laser_cycles: exposed.laser_cycles,
+            shape: self.histograms_shape,
+            macropixels: self.macropixels,
+        };
+        drawn.write(out, &text, histograms)
+    }
+}
+
+/// The same of a report that has become text: `report` is a [`FrameReport`] as JSON.
 ///
 /// # Errors
-/// When they cannot be written, `report` is none, or there are fewer or more counts than it says.
+/// As [`FrameReport::write`], and when `report` is none.
 pub fn write_frame(out: &Path, report: &str, histograms: &[u16]) -> Result<(), InputError> {
-    let drawn: Drawn = parse_json("frame.json", report, "the report of a frame")?;
-    let [rows, cols, bins] = drawn.histograms_shape;
-    if histograms.len() != rows * cols * bins {
-        let message = format!(
-            "{} counts of a frame of {rows}x{cols} macropixels with {bins} bins; give one of each",
-            histograms.len()
-        );
-        return Err(InputError::new("histograms", message));
-    }
-    let shape = drawn.histograms_shape;
-    write_npy_u16(&out.join("histograms.npy"), &shape, histograms)?;
-    depth_map(out, &drawn)?;
-    OutputFile::write_with(&out.join("frame.json"), |file| writeln!(file, "{report}"))
+    let read: ReadReport = parse_json("frame.json", report, "the report of a frame")?;
+    let drawn = Drawn {
+        mode: read.sensor.mode,
+        laser_cycles: read.laser_cycles,
+        shape: read.histograms_shape,
+        macropixels: &read.macropixels,
+    };
+    drawn.write(out, report, histograms)
 }
 
 /// What frame.json says that is also in the other files.
 #[derive(Deserialize)]
-pub(super) struct Drawn {
+struct ReadReport {
     sensor: Chip,
     laser_cycles: u32,
-    pub(super) histograms_shape: [usize; 3],
+    histograms_shape: [usize; 3],
     macropixels: Vec<PixelDepth>,
 }
 
@@ -241,16 +254,40 @@ struct Chip {
     mode: Mode,
 }
 
+/// What files beside frame.json show of a frame.
+struct Drawn<'a> {
+    mode: Mode,
+    laser_cycles: u32,
+    shape: [usize; 3],
+    macropixels: &'a [PixelDepth],
+}
+
+impl Drawn<'_> {
+    fn write(&self, out: &Path, report: &str, histograms: &[u16]) -> Result<(), InputError> {
+        let [rows, cols, bins] = self.shape;
+        if histograms.len() != rows * cols * bins {
+            let message = format!(
+                "{} counts of a frame of {rows}x{cols} macropixels with {bins} bins; give one of each",
+                histograms.len()
+            );
+            return Err(InputError::new("histograms", message));
+        }
+        write_npy_u16(&out.join("histograms.npy"), &self.shape, histograms)?;
+        depth_map(out, self)?;
+        OutputFile::write_with(&out.join("frame.json"), |file| writeln!(file, "{report}"))
+    }
+}
+
 /// Writes `depth.png` into `out`.
 ///
 /// # Errors
 /// When it cannot be written.
-pub(super) fn depth_map(out: &Path, drawn: &Drawn) -> Result<(), InputError> {
-    let mode = match drawn.sensor.mode {
+fn depth_map(out: &Path, drawn: &Drawn<'_>) -> Result<(), InputError> {
+    let mode = match drawn.mode {
         Mode::Guided => "guided",
         Mode::Conventional => "conventional",
     };
-    let [rows, cols, _] = drawn.histograms_shape;
+    let [rows, cols, _] = drawn.shape;
     let cells: Vec<Cell> = (drawn.macropixels.iter())
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
             (_, Some(reason)) => Cell::Category(reason as usize),

@@ -17,7 +17,7 @@ use crate::chip::{Sensor, SensorConfig, library_files};
 use crate::files::{InputError, file_hash, in_plain_words};
 use crate::request::{FrameRequest, Sources, Spelling, eye_safety_of, is_bad_input, sentence};
 use crate::scene::{EyeSafety, Scene};
-use crate::system::{Frame, FrameError, NoDepth, Summary, WindowPolicy, take_frame_by};
+use crate::system::{Frame, NoDepth, SharedWork, Summary, WindowPolicy, take_shared_frame};
 
 /// A study's points as they are taken.
 pub(super) struct Subject<'a> {
@@ -28,6 +28,7 @@ pub(super) struct Subject<'a> {
     hashes: Mutex<HashMap<PathBuf, String>>,
     /// The latest sensors that differ.
     sensors: Mutex<Vec<Sensor>>,
+    shared: SharedWork,
 }
 
 /// Sensors that are kept for points to come: a study that varies more of them has each of them measured again.
@@ -70,6 +71,7 @@ impl<'a> Subject<'a> {
             columns: Self::columns(study.kind),
             hashes: Mutex::default(),
             sensors: Mutex::default(),
+            shared: SharedWork::new(study.replicas),
         }
     }
 
@@ -252,7 +254,10 @@ impl<'a> Subject<'a> {
             }),
             Task::Frame(world, request) => {
                 let begin = Instant::now();
-                let taken = take(&world, &request);
+                let settings = request.settings(world.sensor.clone(), world.scene.clone());
+                let taken = settings.and_then(|(settings, policy)| {
+                    take_shared_frame(&settings, policy, &self.shared, |_| ())
+                });
                 let run_time_s = begin.elapsed().as_secs_f64();
                 match taken {
                     Ok(frame) => Ok(Row {
@@ -270,11 +275,6 @@ impl<'a> Subject<'a> {
             }
         }
     }
-}
-
-fn take(world: &World, request: &FrameRequest) -> Result<Frame, FrameError> {
-    let (settings, policy) = request.settings(world.sensor.clone(), world.scene.clone())?;
-    take_frame_by(&settings, policy, |_| Vec::new(), |_| ())
 }
 
 /// A frame that has been taken.

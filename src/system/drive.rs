@@ -14,7 +14,8 @@
 //!
 //! **What is simulated again.** Only work whose result is provably the one of the frame before is left out, so pictures are the same
 //! without ([`DriveSettings::reuse`]). Start values that are those of the frame before need no load at gate level. Ray casting and light
-//! of a world that has not moved stand, and of one that has those of macropixels that see nothing of it ([`worlds`]). A histogram is a
+//! of a world that has not moved stand, and of one that has those of macropixels that see nothing of it ([`worlds`]). What cameras see of it
+//! but for noise stands, too. A histogram is a
 //! pure function of start value, light, macropixel and the seed of photons: with [`Noise::Fresh`], where every frame has photons of its own,
 //! none is reused; with [`Noise::Still`] a macropixel has the same photons in every frame, and is exposed anew only where its light or
 //! start value has changed.

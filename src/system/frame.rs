@@ -6,8 +6,11 @@
 //!                                            (gate level)    (any engine, probes also at gate level)
 //! ```
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
+use self::at_gates::AtGates;
 use super::error::FrameError;
 use super::light::{light_in, lit, photon_stream, starts_of, truth_in};
 use super::pixel::PixelDepth;
@@ -16,21 +19,21 @@ use super::ranger::{Known, Ranger};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::settings::{EngineKind, FrameSettings, Probe};
+use super::shared::{Look, SharedWork};
 use super::stopwatch::{Stopwatch, timed};
 use super::tolerance::{Kept, Tolerance};
 use crate::chip::{Exposure, SensorConfig};
-use crate::engine::waveform::{self, View};
 use crate::engine::{
-    Answer, Cohort, EngineError, Exposed, GateSimulation, LitPixel, PulsedPixel, Replay, Window,
-    expose, expose_without_skipping, load,
+    Answer, Cohort, EngineError, Exposed, LitPixel, PulsedPixel, Replay, Window, expose,
+    expose_without_skipping, load,
 };
 use crate::guide::{GuideInput, GuideMap};
 use crate::netlist::Netlist;
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use crate::scene::GroundTruth;
-use crate::units::SPEED_OF_LIGHT_M_PER_S;
-use crate::waves::WaveFormat;
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
+mod at_gates;
 #[cfg(test)]
 mod tests;
 
@@ -80,6 +83,34 @@ pub fn take_frame_by<A: Answer>(
     Ok(frame)
 }
 
+/// As [`take_frame_by`] without probes, with the work that frames share.
+///
+/// # Errors
+/// As those of [`take_frame`].
+pub(crate) fn take_shared_frame<A: Answer>(
+    settings: &FrameSettings,
+    policy: WindowPolicy,
+    shared: &SharedWork,
+    exposed: impl Fn(usize) -> A + Sync,
+) -> Result<Frame, FrameError> {
+    let mut clock = Stopwatch::new();
+    let look = shared.look(settings);
+    let Some(guided) = look.windows(settings, policy)? else {
+        return take_frame_by(settings, policy, |_| Vec::new(), exposed);
+    };
+    let guide_s = clock.lap();
+    let (guide, wanted) = &*guided;
+    let plan = Plan {
+        settings,
+        guide,
+        wanted,
+        shared: Some((shared, &look)),
+    };
+    let mut frame = plan.take(|_| Vec::new(), exposed)?;
+    frame.times.guide_s = guide_s;
+    Ok(frame)
+}
+
 /// Takes a frame through windows that are given: `wanted` has a start value for every macropixel, row-major, `None` for one whose
 /// SPADs are off. `guide` is what they were chosen by, for the reasons why macropixels have no depth; the settings' own guide is not asked.
 ///
@@ -103,58 +134,9 @@ pub fn take_guided_frame<A: Answer>(
         settings,
         guide,
         wanted,
+        shared: None,
     };
-    let mut clock = Stopwatch::new();
-    let truth = truth_in(sensor, &settings.exposure, &settings.scene);
-    let scene_s = clock.lap();
-    let light = plan.light(truth);
-    let light_s = clock.lap();
-
-    // A probe keeps one processor busy about as long as load, engine and ranging keep the others.
-    let probes = probes(guide);
-    let by_gates = || timed(|| plan.probe(&light, &probes, &exposed));
-    let by_load_path = || timed(|| plan.load());
-    let by_engine = || {
-        let counted = plan.count(&light, &exposed)?;
-        let ranged = plan.range(&light, &counted)?;
-        Ok::<_, FrameError>((counted, ranged))
-    };
-    let ((probed, probes_s), ((load, load_s), measured)) =
-        rayon::join(by_gates, || rayon::join(by_load_path, by_engine));
-    let together_s = clock.lap();
-    let load = load?;
-    let (counted, ranged) = measured?;
-    let probed = probed?;
-    plan.judge(&counted, &probed)?;
-
-    Ok(Frame {
-        rows: sensor.rows,
-        cols: sensor.cols,
-        bins: sensor.bins,
-        bin_m: ranged.bin_s * SPEED_OF_LIGHT_M_PER_S / 2.0,
-        histograms: counted.exposed.histograms.into_counts(),
-        pixels: ranged.depths,
-        remark: ranged.remark,
-        photons_expected: light.photons_expected(&settings.exposure),
-        work: counted.exposed.work,
-        kept: counted.kept,
-        load_bits: sensor.load_bits(),
-        load_time: load.duration,
-        readout_time: sensor.readout_time(),
-        exposure_time: settings.exposure.end(),
-        probes: probes.iter().map(|p| (p.row, p.col)).collect(),
-        probed_cycles: probed.iter().map(|p| p.exposure.laser_cycles).collect(),
-        times: PhaseTimes {
-            scene_s,
-            load_s,
-            light_s,
-            exposure_s: counted.took_s,
-            probes_s,
-            ranging_s: ranged.took_s,
-            together_s,
-            ..PhaseTimes::default()
-        },
-    })
+    plan.take(probes, exposed)
 }
 
 /// A frame whose windows are chosen.
@@ -162,13 +144,15 @@ struct Plan<'a> {
     settings: &'a FrameSettings,
     guide: &'a GuideMap,
     wanted: &'a [Option<u16>],
+    /// What frames share, and what of it those with this look do.
+    shared: Option<(&'a SharedWork, &'a Arc<Look>)>,
 }
 
 /// What is there, and what of it falls on the array.
 struct Light {
-    truth: GroundTruth,
+    truth: Arc<GroundTruth>,
     stream: PhotonStream,
-    each: Vec<PixelLight>,
+    each: Arc<Vec<PixelLight>>,
     pixels: Vec<LitPixel>,
 }
 
@@ -198,10 +182,75 @@ impl Light {
 }
 
 impl Plan<'_> {
-    fn light(&self, truth: GroundTruth) -> Light {
+    fn take<A: Answer>(
+        &self,
+        probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+        exposed: impl Fn(usize) -> A + Sync,
+    ) -> Result<Frame, FrameError> {
+        let (sensor, exposure) = (&self.settings.sensor, &self.settings.exposure);
+        let mut clock = Stopwatch::new();
+        let truth = match self.shared {
+            Some((_, look)) => look.truth(),
+            None => Arc::new(truth_in(sensor, exposure, &self.settings.scene)),
+        };
+        let scene_s = clock.lap();
+        let light = self.light(truth);
+        let light_s = clock.lap();
+
+        // A probe keeps one processor busy about as long as load, engine and ranging keep the others.
+        let probes = probes(self.guide);
+        let by_gates = || timed(|| self.probe(&light, &probes, &exposed));
+        let by_load_path = || timed(|| self.load());
+        let by_engine = || {
+            let counted = self.count(&light, &exposed)?;
+            let ranged = self.range(&light, &counted)?;
+            Ok::<_, FrameError>((counted, ranged))
+        };
+        let ((probed, probes_s), ((load_time, load_s), measured)) =
+            rayon::join(by_gates, || rayon::join(by_load_path, by_engine));
+        let together_s = clock.lap();
+        let load_time = load_time?;
+        let (counted, ranged) = measured?;
+        let probed = probed?;
+        self.judge(&counted, &probed)?;
+
+        Ok(Frame {
+            rows: sensor.rows,
+            cols: sensor.cols,
+            bins: sensor.bins,
+            bin_m: ranged.bin_s * SPEED_OF_LIGHT_M_PER_S / 2.0,
+            histograms: counted.exposed.histograms.into_counts(),
+            pixels: ranged.depths,
+            remark: ranged.remark,
+            photons_expected: light.photons_expected(exposure),
+            work: counted.exposed.work,
+            kept: counted.kept,
+            load_bits: sensor.load_bits(),
+            load_time,
+            readout_time: sensor.readout_time(),
+            exposure_time: exposure.end(),
+            probes: probes.iter().map(|p| (p.row, p.col)).collect(),
+            probed_cycles: probed.iter().map(|p| p.exposure.laser_cycles).collect(),
+            times: PhaseTimes {
+                scene_s,
+                load_s,
+                light_s,
+                exposure_s: counted.took_s,
+                probes_s,
+                ranging_s: ranged.took_s,
+                together_s,
+                ..PhaseTimes::default()
+            },
+        })
+    }
+
+    fn light(&self, truth: Arc<GroundTruth>) -> Light {
         let s = self.settings;
         let stream = photon_stream(&s.sensor, &s.exposure, s.seed, &s.scene);
-        let each = light_in(&s.exposure, &s.scene, &truth, &stream);
+        let each = match self.shared {
+            Some((_, look)) => look.light(&s.scene, &stream),
+            None => Arc::new(light_in(&s.exposure, &s.scene, &truth, &stream)),
+        };
         Light {
             truth,
             pixels: lit(&s.sensor, self.wanted, &each),
@@ -210,10 +259,17 @@ impl Plan<'_> {
         }
     }
 
-    fn load(&self) -> Result<load::Load, FrameError> {
+    /// Loads the start values at gate level, and tells how long the chip takes for it.
+    fn load(&self) -> Result<Time, FrameError> {
         let sensor = &self.settings.sensor;
         let starts = starts_of(sensor, self.wanted);
-        load_starts(sensor, &load::load_netlist(sensor), &starts)
+        match self.shared {
+            Some((shared, _)) => shared.load(sensor, starts),
+            None => {
+                let load_path = load::load_netlist(sensor);
+                Ok(load_starts(sensor, &load_path, &starts)?.duration)
+            }
+        }
     }
 
     /// The histograms of all macropixels by the engine that the settings ask for.
@@ -248,9 +304,12 @@ impl Plan<'_> {
                 exposed
             }
             (None, true) if *engine == EngineKind::Cohort => {
-                let cohort = Cohort::new(sensor, exposure, *cohort);
+                let cohort = match self.shared {
+                    Some((shared, look)) => shared.cohort(look, self.settings),
+                    None => Arc::new(Cohort::new(sensor, exposure, *cohort)),
+                };
                 let refused = |why| refused_by(&cohort, stream, pixels, why);
-                expose(&cohort, stream, pixels, done).map_err(refused)?
+                expose(&*cohort, stream, pixels, done).map_err(refused)?
             }
             (None, true) => {
                 let engine = engine.expose(sensor, exposure, *cohort);
@@ -416,67 +475,5 @@ fn refused_by(
         why,
         refused: pixels.par_iter().filter(is_refused).count(),
         pixels: pixels.len(),
-    }
-}
-
-/// A macropixel as its gates counted.
-struct AtGates {
-    pixel: usize,
-    start: u16,
-    /// Pulses of the frame's exposure.
-    events: Vec<SpadEvent>,
-    /// What was simulated of it.
-    exposure: Exposure,
-    counts: Vec<u16>,
-}
-
-impl AtGates {
-    /// Runs a probe, and writes its waveform. Only part of the exposure is simulated where the window law tells the rest.
-    fn run(
-        settings: &FrameSettings,
-        stream: &PhotonStream,
-        pixels: &[LitPixel],
-        probe: &Probe,
-    ) -> Result<Self, FrameError> {
-        let (sensor, exposure) = (&settings.sensor, &settings.exposure);
-        let at = (probe.row, probe.col);
-        let pixel = probe.row * sensor.cols + probe.col;
-        let LitPixel {
-            number,
-            start,
-            light,
-        } = &pixels[pixel];
-        let photons = light.as_ref();
-        let photons = photons.map(|light| stream.pixel_events(*number, light));
-        let events = photons.unwrap_or_default().events;
-        let start = *start;
-        let has_tolerance = settings.tolerance_m.is_some();
-        let laser_cycles = match settings.engine.of_probes(has_tolerance) {
-            EngineKind::Window => (probe.wave_cycles).simulated(sensor, exposure, start, &events),
-            _ => exposure.laser_cycles,
-        };
-        let mut probed = AtGates {
-            pixel,
-            start,
-            events,
-            exposure: Exposure {
-                laser_cycles,
-                ..*exposure
-            },
-            counts: Vec::new(),
-        };
-        let (part, pulses) = (&probed.exposure, probed.simulated());
-        let mut simulation = GateSimulation::new(sensor, part, at, (1, 1), &[start], &[pulses]);
-        let view = View::of_pixel(at, sensor, part, start, pulses, probe.wave_cycles);
-        let format = WaveFormat::of(&probe.waves);
-        waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
-        probed.counts = simulation.histograms()?.into_counts();
-        Ok(probed)
-    }
-
-    /// Pulses of what was simulated.
-    fn simulated(&self) -> &[SpadEvent] {
-        let end = self.exposure.end();
-        &self.events[..self.events.partition_point(|event| event.time < end)]
     }
 }

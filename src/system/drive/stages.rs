@@ -58,6 +58,7 @@ impl Drive<'_> {
             time_s: times.middle_s(),
             earlier: &self.past,
             velocity_m_s: DVec3::ZERO,
+            views: self.settings.reuse.then_some(&self.views),
         };
         let guide = frame.guide.estimate(&input)?;
         spent.run.guide_s = clock.lap();

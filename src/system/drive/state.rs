@@ -4,7 +4,7 @@ use super::reuse::Last;
 use super::self_calibration::SelfCalibration;
 use super::settings::{DriveSettings, FrameClock, FrameTimes};
 use crate::engine::load;
-use crate::guide::PastFrame;
+use crate::guide::{CameraViews, PastFrame};
 use crate::netlist::Netlist;
 use crate::system::error::FrameError;
 use crate::system::policy::Pointing;
@@ -21,6 +21,7 @@ pub struct Drive<'a> {
     pub(super) load_netlist: Netlist,
     pub(super) next: u32,
     pub(super) past: Vec<PastFrame>,
+    pub(super) views: CameraViews,
     pub(super) last: Option<Last>,
     pub(super) self_calibration: Option<SelfCalibration>,
 }
@@ -48,6 +49,7 @@ impl<'a> Drive<'a> {
             load_netlist: load::load_netlist(sensor),
             next: 0,
             past: Vec::new(),
+            views: CameraViews::default(),
             last: None,
             self_calibration: (settings.self_calibrates)
                 .then(|| SelfCalibration::new(scene, sensor.rows as u32, sensor.cols as u32)),

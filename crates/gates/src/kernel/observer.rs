@@ -21,12 +21,23 @@ pub trait Observer {
     /// Nothing changes.
     #[inline]
     fn swallowed(&mut self, _: Time, _: NetId, _pulses: u32) {}
+
+    /// Whether it needs [`Observer::change`] at all. Where it does not, the kernel leaves out calls that take long.
+    #[inline]
+    fn needs_changes(&self) -> bool {
+        true
+    }
 }
 
 /// Watches nothing, at no cost.
 impl Observer for () {
     #[inline]
     fn change(&mut self, _: Time, _: NetId, _: Logic) {}
+
+    #[inline]
+    fn needs_changes(&self) -> bool {
+        false
+    }
 }
 
 /// Two observers see the same changes.
@@ -47,6 +58,11 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
         self.0.swallowed(time, net, pulses);
         self.1.swallowed(time, net, pulses);
     }
+
+    #[inline]
+    fn needs_changes(&self) -> bool {
+        self.0.needs_changes() || self.1.needs_changes()
+    }
 }
 
 impl<O: Observer + ?Sized> Observer for &mut O {
@@ -63,6 +79,11 @@ impl<O: Observer + ?Sized> Observer for &mut O {
     #[inline]
     fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
         (**self).swallowed(time, net, pulses);
+    }
+
+    #[inline]
+    fn needs_changes(&self) -> bool {
+        (**self).needs_changes()
     }
 }
 

@@ -7,7 +7,8 @@
 //! With a clock edge every other stage of a shift register changes, all of them one clock-to-output delay later, and
 //! nothing looks before a clock edge of its own. So while all values are known, reset and set are low and nothing is on
 //! its way, an edge shifts 64 stages with one instruction and makes one event for all that change. Nets have their values
-//! and observers hear of each change at the same instants and in the same order as from single flip-flops. Anything
+//! and observers hear of each change at the same instants and in the same order as from single flip-flops. Where no observer
+//! needs changes, the nets take their values only before something reads them. Anything
 //! else (a reset, an unknown, an edge before the last one's changes have come) goes through the flip-flops, and the bank
 //! forms again at a later edge.
 //!
@@ -15,7 +16,7 @@
 //! flip-flops, a tenth of it so.
 
 use super::compiled::CLOCK;
-use crate::netlist::{CellKind, DelayModel, Netlist, Timing};
+use crate::netlist::{CellKind, DelayModel, FlatCell, Netlist, Timing};
 
 /// Stages below which words gain nothing; and METDCs of any size stay as they are.
 const FEWEST: usize = 65;
@@ -40,6 +41,10 @@ pub(super) struct ShiftBank {
     pub is_formed: bool,
     /// A change of the outputs is on its way.
     pub arrives_fs: Option<i64>,
+    /// Clocks of other flip-flops whose D is one of the outputs, in ascending order.
+    pub reading_clocks: Vec<u32>,
+    /// The nets do not have the values yet that the outputs show.
+    pub nets_are_late: bool,
 }
 
 impl ShiftBank {
@@ -110,6 +115,8 @@ impl ShiftBank {
             shown: words,
             is_formed: false,
             arrives_fs: None,
+            reading_clocks: reading_clocks(netlist, chain),
+            nets_are_late: false,
         }
     }
 
@@ -149,6 +156,29 @@ impl ShiftBank {
         self.is_formed = true;
         self.arrives_fs = None;
     }
+}
+
+/// Clocks of flip-flops outside of a chain whose D is an output of it.
+fn reading_clocks(netlist: &Netlist, chain: &[usize]) -> Vec<u32> {
+    let cells = netlist.cells();
+    let (mut is_output, mut is_inside) =
+        (vec![false; netlist.net_count()], vec![false; cells.len()]);
+    for &index in chain {
+        is_inside[index] = true;
+        for output in cells[index].output_nets() {
+            is_output[output.index()] = true;
+        }
+    }
+    let reads = |&(index, cell): &(usize, &FlatCell)| {
+        !is_inside[index] && cell.kind.is_flip_flop() && is_output[cell.input(0).index()]
+    };
+    let readers = cells.iter().enumerate().filter(reads);
+    let mut clocks: Vec<u32> = readers
+        .map(|(_, cell)| cell.input(CLOCK).index() as u32)
+        .collect();
+    clocks.sort_unstable();
+    clocks.dedup();
+    clocks
 }
 
 #[cfg(test)]

@@ -163,7 +163,17 @@ impl Kernel {
         until: Time,
         observer: &mut dyn Observer,
     ) -> Result<(), Oscillation> {
-        let until_fs = until.as_fs();
+        let ended = self.run_until(stimulus, until.as_fs(), observer);
+        self.give_all_values();
+        ended
+    }
+
+    fn run_until(
+        &mut self,
+        stimulus: &mut Stimulus<'_>,
+        until_fs: i64,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Oscillation> {
         loop {
             let drive_fs = stimulus.peek().map_or(i64::MAX, |d| d.time.as_fs());
             let limit_fs = drive_fs.min(until_fs);
@@ -182,6 +192,7 @@ impl Kernel {
             }
             self.settle(observer)?;
             while let Some(cell) = observer.doubtful() {
+                self.give_all_values();
                 self.corrupt(cell);
             }
         }
@@ -362,6 +373,7 @@ impl Kernel {
     /// The flip-flops on a clock that has risen look at D.
     #[inline]
     fn clock(&mut self, net: usize, observer: &mut dyn Observer) {
+        self.give_values_to(net);
         for bank in 0..self.banks.len() {
             if self.banks[bank].clock as usize == net {
                 self.clock_bank(bank, observer);
@@ -395,6 +407,7 @@ impl Kernel {
         let (inputs, evaluated, kind) = (cell.inputs, cell.evaluated, cell.kind);
         cell.evaluated = inputs;
         if kind.is_flip_flop() {
+            self.give_all_values();
             self.dissolve_bank_of(index);
             self.evaluate_flip_flop(index, evaluated, observer);
         } else {

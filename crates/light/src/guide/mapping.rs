@@ -164,6 +164,10 @@ impl Guide for BehaviouralStereo {
         }))
     }
 
+    fn follows_from_look(&self) -> bool {
+        true
+    }
+
     fn reach(&self, scene: &Scene) -> Option<String> {
         let stereo = &scene.stereo;
         let metre_pixels = stereo.camera().focal_px * stereo.baseline_m;

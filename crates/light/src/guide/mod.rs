@@ -8,6 +8,7 @@
 //! A guide makes errors as the instrument it stands for does, and says how large it takes them to be: `sigma_m` is the guide's own
 //! claim, which the windows rely on (Eq. 25) and which may be wrong as the range may be.
 
+mod camera_views;
 mod facet;
 mod from_file;
 mod fused;
@@ -33,6 +34,7 @@ use std::fmt::Debug;
 
 use crate::scene::{DVec3, Scene};
 
+pub use camera_views::CameraViews;
 pub use from_file::FileMap;
 pub use fused::{Fused, MOST_GUIDES};
 pub use intensity::IntensityStereo;
@@ -75,6 +77,8 @@ pub struct GuideInput<'a> {
     pub velocity_m_s: DVec3,
     /// Frames that the lidar has taken before, the latest last.
     pub earlier: &'a [PastFrame],
+    /// What the cameras saw when the guide was asked before: no map depends on it, but a still world is looked at once.
+    pub views: Option<&'a CameraViews>,
 }
 
 impl<'a> GuideInput<'a> {
@@ -88,6 +92,7 @@ impl<'a> GuideInput<'a> {
             time_s: 0.0,
             velocity_m_s: DVec3::ZERO,
             earlier: &[],
+            views: None,
         }
     }
 }
@@ -124,6 +129,11 @@ pub trait Guide: Debug + Send + Sync {
     /// # Errors
     /// What keeps it from giving any.
     fn estimate(&self, input: &GuideInput<'_>) -> Result<GuideMap, GuideError>;
+
+    /// Whether nothing but its name, the look of the scene ([`Scene::looks_like`]), array and seed decides its map of a still scene.
+    fn follows_from_look(&self) -> bool {
+        false
+    }
 
     /// Where it has estimates at all, as part of a sentence; `None` where nothing limits it.
     fn reach(&self, _scene: &Scene) -> Option<String> {

@@ -8,10 +8,13 @@
 //! One ray a pixel, through its middle. Details smaller than a pixel would be chance, another one in each image; so textures of the scene should not be
 //! finer, and the grain that plain surfaces are given here (no real surface is without) has none finer than two pixels.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
+use super::GuideInput;
 use super::right_camera::RightCamera;
 use crate::numerics::branchless;
 use crate::photon::{Purpose, normal, random_stream};
@@ -82,22 +85,44 @@ pub fn view(scene: &Scene, rows: u32, cols: u32) -> Vec<f32> {
     })
 }
 
+/// What both cameras see without noise, left and right, and how long they expose.
+#[derive(Debug)]
+pub(super) struct Radiances {
+    /// As of [`radiances`].
+    pub(super) images: [Vec<f32>; 2],
+    pub(super) exposure_s: f64,
+}
+
+impl Radiances {
+    fn of_pair(scene: &Scene, crop: Crop, grain: f64) -> Self {
+        let camera = scene.stereo.camera();
+        let right = RightCamera::new(&scene.stereo);
+        let position_m = scene.stereo.position_m;
+        let images = [
+            radiances(scene, crop, &camera, grain, |at| {
+                Ray::new(position_m, camera.at_unit_depth(at))
+            }),
+            radiances(scene, crop, &camera, grain, |at| right.ray(at)),
+        ];
+        Radiances {
+            exposure_s: exposure_s(scene, &images[0]),
+            images,
+        }
+    }
+}
+
 /// Left and right image of the crop.
-pub(super) fn pair(scene: &Scene, crop: Crop, grain: f64, seed: u64) -> [GreyImage; 2] {
-    let camera = scene.stereo.camera();
-    let right = RightCamera::new(&scene.stereo);
-    let position_m = scene.stereo.position_m;
-    let seen = [
-        radiances(scene, crop, &camera, grain, |at| {
-            Ray::new(position_m, camera.at_unit_depth(at))
-        }),
-        radiances(scene, crop, &camera, grain, |at| right.ray(at)),
-    ];
-    let exposure_s = exposure_s(scene, &seen[0]);
+pub(super) fn pair(input: &GuideInput<'_>, crop: Crop, grain: f64) -> [GreyImage; 2] {
+    let scene = input.scene;
+    let render = || Radiances::of_pair(scene, crop, grain);
+    let seen = match input.views {
+        Some(views) => views.radiances(scene, (crop, grain), render),
+        None => Arc::new(render()),
+    };
     let mut side = 0;
-    seen.map(|radiances| {
+    seen.images.each_ref().map(|radiances| {
         side += 1;
-        expose(scene, crop, &radiances, exposure_s, seed, side)
+        expose(scene, crop, radiances, seen.exposure_s, input.seed, side)
     })
 }
 

@@ -125,7 +125,7 @@ impl MatchedStereo {
 
     /// Disparities of the crop, binned pixels.
     pub(super) fn disparities(&self, input: &GuideInput<'_>, crop: Crop) -> Option<DisparityMap> {
-        let [left, right] = pair(input.scene, crop, self.grain, input.seed);
+        let [left, right] = pair(input, crop, self.grain);
         self.matcher(input.scene).match_pair(&left, &right).ok()
     }
 

@@ -18,6 +18,7 @@ mod fog;
 mod heat;
 mod illumination;
 mod interferer;
+mod look;
 mod medium;
 #[cfg(test)]
 #[path = "tests/mirrors.rs"]

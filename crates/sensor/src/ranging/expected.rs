@@ -16,8 +16,11 @@
 
 mod other_bins;
 
+use smallvec::smallvec;
+
 use super::counting::Counting;
-use super::plain::{self, LANES};
+use super::known_chances;
+use super::plain::{self, LANES, OfBins};
 use super::pulse::{PULSE_REACH, Pulse, Tail};
 use super::spad_state::{Dead, Spad};
 use crate::chip::{EventType, SensorConfig};
@@ -228,11 +231,7 @@ impl Response {
     }
 
     /// The chances with their slopes with the first K parameters.
-    pub(super) fn chances_of<const K: usize>(
-        &self,
-        light: &EchoLight,
-        steps: Steps,
-    ) -> Vec<Dual<K>> {
+    pub(super) fn chances_of<const K: usize>(&self, light: &EchoLight, steps: Steps) -> OfBins<K> {
         if let Some(law) = self.other_bins {
             return law.chances(self, light);
         }
@@ -240,35 +239,40 @@ impl Response {
         if self.dead.is_plain() {
             self.chances_of_plain(light, steps)
         } else {
-            self.chances_by(light, steps)
+            OfBins::from_vec(self.chances_by(light, steps))
         }
     }
 
-    /// The same of some lights.
+    /// The same of some lights, told with their numbers, in order.
     pub(super) fn chances_of_each<const K: usize>(
         &self,
         lights: &[EchoLight],
         steps: Steps,
-    ) -> Vec<Vec<Dual<K>>> {
-        let some = lights.chunks(LANES);
-        let of_some = some.flat_map(|lights| {
-            let is_ours = self.other_bins.is_none();
-            if is_ours && self.dead.is_plain() && lights.len() >= WORTH_LANES {
-                self.chances_in_lanes(lights, steps)
+        mut tell: impl FnMut(usize, &[Dual<K>]),
+    ) {
+        let has_lanes = self.other_bins.is_none() && self.dead.is_plain();
+        for (group, of_group) in lights.chunks(LANES).enumerate() {
+            let first = group * LANES;
+            if has_lanes && of_group.len() >= WORTH_LANES {
+                let chances = self.chances_in_lanes(of_group, steps);
+                let chances = chances.iter().take(of_group.len());
+                chances
+                    .enumerate()
+                    .for_each(|(lane, of_light)| tell(first + lane, of_light));
             } else {
-                let of_light = |light| self.chances_of(light, steps);
-                lights.iter().map(of_light).collect()
+                for (number, light) in of_group.iter().enumerate() {
+                    tell(first + number, &self.chances_of(light, steps));
+                }
             }
-        });
-        of_some.collect()
+        }
     }
 
-    /// The same of plain SPADs and no more lights than lanes.
+    /// The same of plain SPADs and no more lights than lanes; of fewer, the last ones are the same.
     fn chances_in_lanes<const K: usize>(
         &self,
         lights: &[EchoLight],
         steps: Steps,
-    ) -> Vec<Vec<Dual<K>>> {
+    ) -> [OfBins<K>; LANES] {
         let spads = self.counting.spads as f64;
         let of_lanes: [&EchoLight; LANES] =
             std::array::from_fn(|lane| &lights[lane.min(lights.len() - 1)]);
@@ -282,16 +286,22 @@ impl Response {
         let before = (-begin_bin).max(0.0) as usize;
         let bins = self.bins + before - unlit;
         let dead = self.dead.time_bins;
-        let steps = plain::Steps::new(begin_bin, bins, &pulses, most_steps, dead);
-        let fired = plain::fired_by_each::<K>((&pulses, &background), &steps, dead);
-        let chances_of = |lane: usize| {
-            let steady = plain::steady(background[lane], dead);
-            let lit = fired[before..].iter().map(|fired| fired[lane]);
-            let fired = std::iter::repeat_n(steady, unlit).chain(lit);
-            let chances = fired.map(|fired| self.counting.chance(fired, Dual::ZERO));
-            chances.collect()
-        };
-        (0..lights.len()).map(chances_of).collect()
+        let steps = plain::Steps::of(begin_bin, bins, &pulses, most_steps, dead);
+        let mut of_bins =
+            background.map(|background| smallvec![plain::steady(background, dead); unlit]);
+        plain::fired_by_each(&pulses, &background, &steps, &mut of_bins);
+        for of_lane in &mut of_bins {
+            self.as_chances(before, of_lane);
+        }
+        of_bins
+    }
+
+    /// Turns how often a SPAD fires in each bin, beginning `before` bins before those of the histogram, into their chances to count.
+    fn as_chances<const K: usize>(&self, before: usize, of_bins: &mut OfBins<K>) {
+        of_bins.drain(..before);
+        for of_bin in of_bins {
+            *of_bin = self.counting.chance(*of_bin, Dual::ZERO);
+        }
     }
 
     /// Light of the echo on a SPAD.
@@ -313,22 +323,34 @@ impl Response {
     }
 
     /// The same of plain SPADs.
-    fn chances_of_plain<const K: usize>(&self, light: &EchoLight, steps: usize) -> Vec<Dual<K>> {
+    fn chances_of_plain<const K: usize>(&self, light: &EchoLight, steps: usize) -> OfBins<K> {
+        if let Some(known) = known_chances::find(self, light, steps) {
+            return known;
+        }
+        if K == 0 {
+            let chances = self.chances_with::<0>(light, steps);
+            let values = chances.iter().map(|chance| Dual::constant(chance.value));
+            return values.collect();
+        }
+        // All slopes cost no more than some, and a fit with a width of its own begins where one without ends.
+        let chances = self.chances_with::<4>(light, steps);
+        known_chances::keep(self, light, steps, &chances);
+        known_chances::first_slopes(&chances)
+    }
+
+    /// The same with no slopes, or with all.
+    fn chances_with<const K: usize>(&self, light: &EchoLight, steps: usize) -> OfBins<K> {
         let (pulse, dead) = (self.pulse(light), self.dead.time_bins);
         let background = light.background_per_bin / self.counting.spads as f64;
         let begin_bin = self.begin_bin(&pulse);
         let unlit = begin_bin.max(0.0) as usize;
         let before = (-begin_bin).max(0.0) as usize;
         let bins = self.bins + before - unlit;
-        let steps = plain::Steps::new(begin_bin, bins, &[pulse], steps, dead);
-        let mut fired = Vec::with_capacity(unlit + bins);
-        fired.resize(unlit, plain::steady(background, dead));
-        plain::fired((&pulse, background), &steps, dead, &mut fired);
-        fired.drain(..before);
-        for fired in &mut fired {
-            *fired = self.counting.chance(*fired, Dual::ZERO);
-        }
-        fired
+        let steps = plain::Steps::of(begin_bin, bins, &[pulse], steps, dead);
+        let mut of_bins = smallvec![plain::steady(background, dead); unlit];
+        plain::fired(&pulse, background, &steps, &mut of_bins);
+        self.as_chances(before, &mut of_bins);
+        of_bins
     }
 
     fn chances_by<const K: usize>(&self, light: &EchoLight, steps_per_bin: usize) -> Vec<Dual<K>> {

@@ -111,43 +111,48 @@ struct Local {
 
 impl Likelihood<'_> {
     /// Twice the ln likelihood that is missing at these chances.
-    fn deviance_of(&self, chances: impl Iterator<Item = f64>) -> f64 {
-        let chances: SmallVec<[f64; MOST_BINS]> = chances.collect();
-        let bins = self.bins.clone();
-        2.0 * missing(&self.counts[bins.clone()], &chances[bins], self.cycles)
+    fn deviance_of<const K: usize>(&self, chances: &[Dual<K>]) -> f64 {
+        let values = chances[self.bins.clone()].iter().map(|chance| chance.value);
+        let values: SmallVec<[f64; MOST_BINS]> = values.collect();
+        2.0 * missing(&self.counts[self.bins.clone()], &values, self.cycles)
     }
 
     /// The deviances of some lights, about.
     pub(super) fn deviances(&self, lights: &[EchoLight]) -> Vec<f64> {
-        let chances = self.response.chances_of_each::<0>(lights, Steps::Coarse);
-        let of_light = |chances: &Vec<Dual<0>>| {
-            let values = chances.iter().map(|chance| chance.value);
-            self.deviance_of(values)
-        };
-        chances.iter().map(of_light).collect()
+        let mut deviances = Vec::with_capacity(lights.len());
+        self.response
+            .chances_of_each::<0>(lights, Steps::Coarse, |_, chances| {
+                deviances.push(self.deviance_of(chances));
+            });
+        deviances
     }
 
-    /// What the histogram says at each of some lights.
-    fn at_each(&self, lights: &[EchoLight], steps: Steps) -> Vec<Local> {
+    /// Tells what the histogram says at each of some lights, with their numbers, in order.
+    fn at_each(&self, lights: &[EchoLight], steps: Steps, tell: impl FnMut(usize, Local)) {
         match self.free {
-            WIDE_ECHO | WIDE_IN_REGION => self.locals::<4>(lights, steps),
-            ONLY_SIGNAL | IN_REGION => self.locals::<2>(lights, steps),
-            _ => self.locals::<3>(lights, steps),
+            WIDE_ECHO | WIDE_IN_REGION => self.locals::<4>(lights, steps, tell),
+            ONLY_SIGNAL | IN_REGION => self.locals::<2>(lights, steps, tell),
+            _ => self.locals::<3>(lights, steps, tell),
         }
     }
 
-    fn locals<const K: usize>(&self, lights: &[EchoLight], steps: Steps) -> Vec<Local> {
-        let chances = self.response.chances_of_each::<K>(lights, steps);
-        let both = lights.iter().zip(chances);
-        both.map(|(light, chances)| self.local(light, chances))
-            .collect()
+    fn locals<const K: usize>(
+        &self,
+        lights: &[EchoLight],
+        steps: Steps,
+        mut tell: impl FnMut(usize, Local),
+    ) {
+        self.response
+            .chances_of_each::<K>(lights, steps, |number, chances| {
+                tell(number, self.local(&lights[number], chances));
+            });
     }
 
     /// What chances at `light` say, with their slopes with the first K parameters.
-    fn local<const K: usize>(&self, light: &EchoLight, chances: Vec<Dual<K>>) -> Local {
+    fn local<const K: usize>(&self, light: &EchoLight, chances: &[Dual<K>]) -> Local {
         let mut local = Local {
             background: light.background_per_bin,
-            deviance: self.deviance_of(chances.iter().map(|chance| chance.value)),
+            deviance: self.deviance_of(chances),
             score: [0.0; PARAMETERS],
             information: [[0.0; PARAMETERS]; PARAMETERS],
         };
@@ -202,25 +207,27 @@ impl Likelihood<'_> {
 
     /// All climb side by side, because the chances of many lights cost little more than those of one.
     fn maximise_in(&self, starts: &[EchoLight], steps: Steps, close: f64) -> Vec<Fit> {
-        let locals = self.at_each(starts, steps).into_iter();
-        let climbs = starts.iter().zip(locals);
-        let mut climbs: Vec<Climb> = climbs.map(|(light, at)| Climb::new(*light, at)).collect();
+        let mut climbs: SmallVec<[Climb; 2]> = SmallVec::new();
+        self.at_each(starts, steps, |number, there| {
+            climbs.push(Climb::new(starts[number], there));
+        });
+        let mut under_way: SmallVec<[usize; 2]> = SmallVec::new();
+        let mut lights: SmallVec<[EchoLight; 2]> = SmallVec::new();
         loop {
-            let mut under_way = Vec::new();
-            let mut lights = Vec::new();
-            for climb in &mut climbs {
+            under_way.clear();
+            lights.clear();
+            for (number, climb) in climbs.iter_mut().enumerate() {
                 if let Some(next) = climb.next(self, close) {
                     lights.push(next);
-                    under_way.push(climb);
+                    under_way.push(number);
                 }
             }
             if lights.is_empty() {
                 break;
             }
-            let there = self.at_each(&lights, steps);
-            for ((climb, light), there) in under_way.into_iter().zip(lights).zip(there) {
-                climb.go_to(light, there);
-            }
+            self.at_each(&lights, steps, |number, there| {
+                climbs[under_way[number]].go_to(lights[number], there);
+            });
         }
         climbs.into_iter().map(|climb| climb.fit(self)).collect()
     }

@@ -11,47 +11,71 @@
 //! lines and 96 steps in all bins 4 (55). A histogram takes some fifty to three hundred steps, and a fit some ten histograms; therefore exponentials
 //! come as vectors, and what one step waits for of the one before is a product and a sum. Of lights side by side
 //! each is a lane of the vectors: starts of a search, and fits that climb together.
+//!
+//! Lights of one fit have the same steps again and again, so a thread keeps its latest steps, and the memory for its sums.
 
 #![allow(
     unsafe_code,
     reason = "multiversion calls what the processor was asked for"
 )]
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use multiversion::multiversion;
+use smallvec::SmallVec;
 
 use super::pulse::Pulse;
 use crate::numerics::{Dual, branchless};
 
 /// Steps to a bin away from the pulse.
-const STEPS_BESIDE: usize = 2;
+const STEPS_BESIDE: u8 = 2;
 
 /// Standard deviations before and after its centre in which a pulse needs its own steps: 3·10⁻⁷ of it comes before, 3·10⁻⁶ after.
 const BEGINS: f64 = 5.0;
 const ENDS: f64 = 4.5;
 
-/// Steps in which time goes, of one length within a bin.
-#[derive(Debug, Clone)]
+/// Steps that a thread keeps.
+const MOST_KEPT: usize = 64;
+
+thread_local! {
+    /// The latest steps that differ, the last first.
+    static LATEST: RefCell<Vec<Rc<Steps>>> = const { RefCell::new(Vec::new()) };
+    static ROWS: RefCell<Rows> = RefCell::default();
+}
+
+/// Steps in which time goes, of one length within a bin, and what follows from them alone.
+#[derive(Debug)]
 pub(super) struct Steps {
     /// The first bin, which may lie before those of the histogram.
     first_bin: f64,
     /// Steps of each bin from there.
-    of_bins: Vec<usize>,
+    of_bins: SmallVec<[u8; 32]>,
+    /// Dead time, bins.
+    dead: f64,
+    /// Times between steps, bins.
+    times: Vec<f64>,
+    /// From one time to the next.
+    lengths: Vec<f64>,
+    /// What had fired a dead time before the end of each step: these parts of four sums in a row, from the first of these.
+    parts: Vec<(usize, [f64; 4])>,
 }
 
 impl Steps {
     /// Those of `bins` bins: `steps` in each with light of a pulse, and in each where SPADs recover from it a dead time of `dead` bins later.
-    pub(super) fn new(
+    pub(super) fn of(
         first_bin: f64,
         bins: usize,
         pulses: &[Pulse],
         steps: usize,
         dead: f64,
-    ) -> Self {
+    ) -> Rc<Self> {
+        let steps = u8::try_from(steps).expect("few steps");
+        let lit = pulses.iter().map(|pulse| pulse.within(BEGINS, ENDS));
+        let lit: SmallVec<[[f64; 2]; LANES]> = lit.collect();
         let is_lit = |begin: f64| {
-            pulses.iter().any(|pulse| {
-                let [from, to] = pulse.within(BEGINS, ENDS);
-                begin + 1.0 > from && begin < to
-            })
+            lit.iter()
+                .any(|&[from, to]| begin + 1.0 > from && begin < to)
         };
         let of_bin = |bin| {
             let begin = first_bin - 0.5 + bin as f64;
@@ -61,24 +85,80 @@ impl Steps {
                 STEPS_BESIDE
             }
         };
-        Steps {
-            first_bin,
-            of_bins: (0..bins).map(of_bin).collect(),
-        }
+        let of_bins: SmallVec<[u8; 32]> = (0..bins).map(of_bin).collect();
+        LATEST.with_borrow_mut(|latest| {
+            let is_same = |known: &Rc<Self>| {
+                known.first_bin == first_bin && known.dead == dead && known.of_bins == of_bins
+            };
+            if let Some(at) = latest.iter().position(is_same) {
+                latest[..=at].rotate_right(1);
+            } else {
+                latest.truncate(MOST_KEPT - 1);
+                latest.insert(0, Rc::new(Self::new(first_bin, of_bins, dead)));
+            }
+            Rc::clone(&latest[0])
+        })
     }
 
-    /// Times between steps, bins.
-    fn times(&self) -> Vec<f64> {
-        let mut times = Vec::with_capacity(self.of_bins.iter().sum::<usize>() + 1);
-        let mut begin = self.first_bin - 0.5;
-        for &steps in &self.of_bins {
-            let length = 1.0 / steps as f64;
-            times.extend((0..steps).map(|step| begin + step as f64 * length));
+    fn new(first_bin: f64, of_bins: SmallVec<[u8; 32]>, dead: f64) -> Self {
+        let mut times = Vec::new();
+        let mut begin = first_bin - 0.5;
+        for &steps in &of_bins {
+            let length = 1.0 / f64::from(steps);
+            times.extend((0..steps).map(|step| begin + f64::from(step) * length));
             begin += 1.0;
         }
         times.push(begin);
-        times
+        Steps {
+            first_bin,
+            of_bins,
+            dead,
+            lengths: times.windows(2).map(|ends| ends[1] - ends[0]).collect(),
+            parts: parts_before(&times, dead),
+            times,
+        }
     }
+
+    /// The first and the last of the times of each bin, by their numbers.
+    fn ends_of_bins(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.of_bins.iter().scan(0, |from, &of_bin| {
+            let ends = (*from, *from + usize::from(of_bin));
+            *from = ends.1;
+            Some(ends)
+        })
+    }
+}
+
+/// Memory for numbers of each step, which fits take again and again.
+#[derive(Debug, Default)]
+struct Rows {
+    until: Vec<f64>,
+    by_place: Vec<f64>,
+    by_width: Vec<f64>,
+    none: Vec<f64>,
+    missed: Vec<f64>,
+    falls: Vec<f64>,
+    sums: Vec<f64>,
+    slopes: Vec<[f64; 4]>,
+    lanes: LaneRows,
+}
+
+/// The same for lights side by side.
+#[derive(Debug, Default)]
+struct LaneRows {
+    until: Vec<Lanes>,
+    by_place: Vec<Lanes>,
+    by_width: Vec<Lanes>,
+    sums: Vec<Lanes>,
+    /// K numbers to a time.
+    slopes: Vec<Lanes>,
+}
+
+/// As many zeros.
+fn zeros<T: Copy + Default>(row: &mut Vec<T>, length: usize) -> &mut [T] {
+    row.clear();
+    row.resize(length, T::default());
+    row
 }
 
 /// What the light of a step does to SPADs.
@@ -135,7 +215,6 @@ fn cubic(time: f64, times: &[f64]) -> [f64; 4] {
 }
 
 /// What had fired a dead time before the end of each step: these parts of four sums in a row, from the first of these.
-#[inline(always)]
 fn parts_before(times: &[f64], dead: f64) -> Vec<(usize, [f64; 4])> {
     let mut parts = Vec::with_capacity(times.len());
     // The time before which a dead time ends.
@@ -157,99 +236,91 @@ fn parts_before(times: &[f64], dead: f64) -> Vec<(usize, [f64; 4])> {
     parts
 }
 
-/// What comes of a step.
-#[derive(Debug, Clone, Copy, Default)]
-struct Step {
-    /// Of SPADs that are ready, and of those that recover: the share that fires and the share that stays ready.
-    hit: f64,
-    none: f64,
-    late: f64,
-    missed: f64,
-    falls: f64,
-    /// Slopes of the photons with place, ln signal, ln background and ln width.
-    slopes: [f64; 4],
-    /// What had fired a dead time before the end: these parts of four sums in a row.
-    first: usize,
-    parts: [f64; 4],
+/// Chances of bins, and their slopes.
+pub(super) type OfBins<const K: usize> = SmallVec<[Dual<K>; 16]>;
+
+/// Puts behind `of_bins` the chance of a SPAD to fire in each bin of `steps`, with its slopes with place, ln signal, ln background and ln width where
+/// `K` is 4; they are none where it is 0. Before the first step there is background alone, `background` photons a bin.
+pub(super) fn fired<const K: usize>(
+    pulse: &Pulse,
+    background: f64,
+    steps: &Steps,
+    of_bins: &mut OfBins<K>,
+) {
+    const { assert!(K == 0 || K == 4, "slopes come all together") };
+    ROWS.with_borrow_mut(|rows| fired_in(pulse, background, steps, rows, of_bins));
 }
 
-/// Puts behind `of_bins` the chance of a SPAD with a dead time of `dead` bins to fire in each bin of `steps`, with its slopes with the first K of
-/// place, ln signal, ln background and ln width. Before the first step there is background alone, `background` photons a bin.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn fired<const K: usize>(
-    (pulse, background): (&Pulse, f64),
+fn fired_in<const K: usize>(
+    pulse: &Pulse,
+    background: f64,
     steps: &Steps,
-    dead: f64,
-    of_bins: &mut Vec<Dual<K>>,
+    rows: &mut Rows,
+    of_bins: &mut OfBins<K>,
 ) {
-    let times = steps.times();
-    let count = times.len() - 1;
-    let [until, by_place, by_width] = pulse.until_each(&times);
-    let mut rows = vec![0.0; 3 * count];
-    let (none, rest) = rows.split_at_mut(count);
-    let (missed, falls) = rest.split_at_mut(count);
+    let (times, count) = (&steps.times[..], steps.lengths.len());
+    let (lengths, parts) = (&steps.lengths[..count], &steps.parts[..count]);
+    let until = zeros(&mut rows.until, count + 1);
+    let with_slopes = if K > 0 { count + 1 } else { 0 };
+    let by_place = zeros(&mut rows.by_place, with_slopes);
+    let by_width = zeros(&mut rows.by_width, with_slopes);
+    pulse.until_each_in(times, |at, values| {
+        until[at] = values[0];
+        if K > 0 {
+            by_place[at] = values[1];
+            by_width[at] = values[2];
+        }
+    });
+    // Lengths that the compiler knows save it from checking each place.
+    let until = &until[..count + 1];
+    let (by_place, by_width) = (&by_place[..with_slopes], &by_width[..with_slopes]);
+    let none = &mut zeros(&mut rows.none, count)[..count];
+    let missed = &mut zeros(&mut rows.missed, count)[..count];
+    let falls = &mut zeros(&mut rows.falls, count)[..count];
     for step in 0..count {
-        let of_step = until[step + 1] - until[step] + background * (times[step + 1] - times[step]);
-        let hits = Hits::new(of_step);
+        let hits = Hits::new(until[step + 1] - until[step] + background * lengths[step]);
         none[step] = hits.none;
         missed[step] = hits.missed;
         falls[step] = hits.falls;
     }
-    let mut laws = vec![Step::default(); count];
-    let parts = parts_before(&times, dead);
-    for ((step, law), (first, parts)) in laws.iter_mut().enumerate().zip(parts) {
-        let of_pulse = until[step + 1] - until[step];
-        let of_background = background * (times[step + 1] - times[step]);
-        *law = Step {
-            hit: (of_pulse + of_background) * missed[step],
-            none: none[step],
-            late: 1.0 - missed[step],
-            missed: missed[step],
-            falls: falls[step],
-            slopes: [
-                by_place[step + 1] - by_place[step],
-                of_pulse,
-                of_background,
-                by_width[step + 1] - by_width[step],
-            ],
-            first,
-            parts,
-        };
-    }
-    let Dual { value, slope } = steady::<4>(background, dead);
+    let Dual { value, slope } = steady::<4>(background, steps.dead);
     // Sums of what has fired since a dead time before the first step.
-    let mut sums = vec![0.0; count + 4];
-    let mut slopes = vec![[0.0; 4]; if K > 0 { count + 4 } else { 0 }];
-    sums[0] = value * dead;
+    let sums = &mut zeros(&mut rows.sums, count + 4)[..count + 4];
+    let slopes = zeros(&mut rows.slopes, if K > 0 { count + 4 } else { 0 });
+    sums[0] = value * steps.dead;
     let mut sum = sums[0];
     let mut ready = 1.0 - sum;
-    let mut sum_slopes = slope.map(|slope| slope * dead);
+    let mut sum_slopes = slope.map(|slope| slope * steps.dead);
     let mut ready_slopes = sum_slopes.map(|slope| -slope);
     if K > 0 {
         slopes[0] = sum_slopes;
     }
     let (mut ended, mut ended_slopes) = (0.0, [0.0; 4]);
-    for (step, law) in laws.iter().enumerate() {
-        let Step {
-            hit,
-            none,
-            late,
-            missed,
-            ..
-        } = *law;
-        let [a, b, c, d] = law.parts;
-        let of: &[f64; 4] = sums[law.first..law.first + 4].try_into().expect("four");
+    for step in 0..count {
+        let (first, [a, b, c, d]) = parts[step];
+        let (none, missed) = (none[step], missed[step]);
+        let of_pulse = until[step + 1] - until[step];
+        let of_background = background * lengths[step];
+        let (hit, late) = ((of_pulse + of_background) * missed, 1.0 - missed);
+        let of: &[f64; 4] = sums[first..first + 4].try_into().expect("four");
         let now = (of[0] * a + of[1] * b) + (of[2] * c + of[3] * d);
         let ending = now - ended;
         ended = now;
         if K > 0 {
-            let more = ready * none + ending * law.falls;
-            let of: &[[f64; 4]; 4] = slopes[law.first..law.first + 4].try_into().expect("four");
+            let more = ready * none + ending * falls[step];
+            let photons = [
+                by_place[step + 1] - by_place[step],
+                of_pulse,
+                of_background,
+                by_width[step + 1] - by_width[step],
+            ];
+            let [w, x, y, z]: &[[f64; 4]; 4] = slopes[first..first + 4].try_into().expect("four");
             for k in 0..4 {
-                let now = (of[0][k] * a + of[1][k] * b) + (of[2][k] * c + of[3][k] * d);
+                let now = (w[k] * a + x[k] * b) + (y[k] * c + z[k] * d);
                 let ending = now - ended_slopes[k];
                 ended_slopes[k] = now;
-                let more = law.slopes[k] * more;
+                let more = photons[k] * more;
                 sum_slopes[k] += ready_slopes[k] * hit + ending * late + more;
                 ready_slopes[k] = ready_slopes[k] * none + ending * missed - more;
             }
@@ -259,14 +330,12 @@ pub(super) fn fired<const K: usize>(
         ready = ready * none + ending * missed;
         sums[step + 1] = sum;
     }
-    let mut from = 0;
-    for &of_bin in &steps.of_bins {
-        let to = from + of_bin;
+    of_bins.reserve(steps.of_bins.len());
+    for (from, to) in steps.ends_of_bins() {
         of_bins.push(Dual {
             value: sums[to] - sums[from],
             slope: std::array::from_fn(|k| slopes[to][k] - slopes[from][k]),
         });
-        from = to;
     }
 }
 
@@ -276,21 +345,32 @@ pub(super) const LANES: usize = 8;
 /// A number of each of these lights.
 type Lanes = [f64; LANES];
 
-/// The same as [`fired`] for some lights at once, each with its own pulse and background, in the same steps.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+/// The same as [`fired`] for some lights at once, each with its own pulse and background, in the same steps; slopes are the first K.
 pub(super) fn fired_by_each<const K: usize>(
-    (pulses, background): (&[Pulse; LANES], &Lanes),
+    pulses: &[Pulse; LANES],
+    background: &Lanes,
     steps: &Steps,
-    dead: f64,
-) -> Vec<[Dual<K>; LANES]> {
-    let times = steps.times();
-    let count = times.len() - 1;
-    let with_slopes = if K > 0 { count + 1 } else { 0 };
-    let mut until = vec![[0.0; LANES]; count + 1];
-    let mut by_place = vec![[0.0; LANES]; with_slopes];
-    let mut by_width = vec![[0.0; LANES]; if K > 3 { count + 1 } else { 0 }];
+    of_bins: &mut [OfBins<K>; LANES],
+) {
+    ROWS.with_borrow_mut(|rows| {
+        fired_by_each_in(pulses, background, steps, &mut rows.lanes, of_bins);
+    });
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fired_by_each_in<const K: usize>(
+    pulses: &[Pulse; LANES],
+    background: &Lanes,
+    steps: &Steps,
+    rows: &mut LaneRows,
+    of_bins: &mut [OfBins<K>; LANES],
+) {
+    let (times, count) = (&steps.times[..], steps.lengths.len());
+    let until = zeros(&mut rows.until, count + 1);
+    let by_place = zeros(&mut rows.by_place, if K > 0 { count + 1 } else { 0 });
+    let by_width = zeros(&mut rows.by_width, if K > 3 { count + 1 } else { 0 });
     for (lane, pulse) in pulses.iter().enumerate() {
-        pulse.until_each_in(&times, |at, values| {
+        pulse.until_each_in(times, |at, values| {
             until[at][lane] = values[0];
             if K > 0 {
                 by_place[at][lane] = values[1];
@@ -300,20 +380,20 @@ pub(super) fn fired_by_each<const K: usize>(
             }
         });
     }
-    let start: [Dual<4>; LANES] = background.map(|background| steady(background, dead));
-    let mut sums = vec![[0.0; LANES]; count + 4];
-    let mut slopes = vec![[[0.0; LANES]; K]; if K > 0 { count + 4 } else { 1 }];
-    let mut sum: Lanes = std::array::from_fn(|l| start[l].value * dead);
+    let start: [Dual<4>; LANES] = background.map(|background| steady(background, steps.dead));
+    let sums = zeros(&mut rows.sums, count + 4);
+    let slopes = zeros(&mut rows.slopes, K * (count + 4));
+    let mut sum: Lanes = std::array::from_fn(|l| start[l].value * steps.dead);
     let mut sum_slopes: [Lanes; K] =
-        std::array::from_fn(|k| std::array::from_fn(|l| start[l].slope[k] * dead));
+        std::array::from_fn(|k| std::array::from_fn(|l| start[l].slope[k] * steps.dead));
     let mut ready = sum.map(|sum| 1.0 - sum);
     let mut ready_slopes = sum_slopes.map(|slopes| slopes.map(|slope| -slope));
     let mut ended = [0.0; LANES];
     let mut ended_slopes = [[0.0; LANES]; K];
     sums[0] = sum;
-    slopes[0] = sum_slopes;
-    for (step, (first, [a, b, c, d])) in parts_before(&times, dead).into_iter().enumerate() {
-        let length = times[step + 1] - times[step];
+    slopes[..K].copy_from_slice(&sum_slopes);
+    for (step, &(first, [a, b, c, d])) in steps.parts.iter().enumerate() {
+        let length = steps.lengths[step];
         let (from, to) = (&until[step], &until[step + 1]);
         let [w, x, y, z]: &[Lanes; 4] = sums[first..first + 4].try_into().expect("four");
         let mut more = [0.0; LANES];
@@ -339,11 +419,8 @@ pub(super) fn fired_by_each<const K: usize>(
             of_ending[1][l] = missed;
         }
         sums[step + 1] = sum;
-        if K == 0 {
-            continue;
-        }
-        let [w, x, y, z]: &[[Lanes; K]; 4] = slopes[first..first + 4].try_into().expect("four");
         for k in 0..K {
+            let [w, x, y, z] = [0, 1, 2, 3].map(|sum| &slopes[K * (first + sum) + k]);
             for l in 0..LANES {
                 // Place, ln signal, ln background and ln width.
                 let photons = match k {
@@ -352,7 +429,7 @@ pub(super) fn fired_by_each<const K: usize>(
                     2 => background[l] * length,
                     _ => by_width[step + 1][l] - by_width[step][l],
                 };
-                let now = (w[k][l] * a + x[k][l] * b) + (y[k][l] * c + z[k][l] * d);
+                let now = (w[l] * a + x[l] * b) + (y[l] * c + z[l] * d);
                 let ending = now - ended_slopes[k][l];
                 ended_slopes[k][l] = now;
                 let more = photons * more[l];
@@ -361,18 +438,15 @@ pub(super) fn fired_by_each<const K: usize>(
                 ready_slopes[k][l] = was_ready * of_ready[1][l] + ending * of_ending[1][l] - more;
             }
         }
-        slopes[step + 1] = sum_slopes;
+        slopes[K * (step + 1)..K * (step + 2)].copy_from_slice(&sum_slopes);
     }
-    let mut from = 0;
-    let of_bin = |&of_bin: &usize| {
-        let to = from + of_bin;
-        let of_lane = |l: usize| Dual {
-            value: sums[to][l] - sums[from][l],
-            slope: std::array::from_fn(|k| slopes[to][k][l] - slopes[from][k][l]),
-        };
-        let fired = std::array::from_fn(of_lane);
-        from = to;
-        fired
-    };
-    steps.of_bins.iter().map(of_bin).collect()
+    for (l, of_bins) in of_bins.iter_mut().enumerate() {
+        of_bins.reserve(steps.of_bins.len());
+        for (from, to) in steps.ends_of_bins() {
+            of_bins.push(Dual {
+                value: sums[to][l] - sums[from][l],
+                slope: std::array::from_fn(|k| slopes[K * to + k][l] - slopes[K * from + k][l]),
+            });
+        }
+    }
 }

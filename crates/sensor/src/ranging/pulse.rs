@@ -70,15 +70,15 @@ impl Pulse {
     pub(super) fn until_each_in(&self, times: &[f64], mut tell: impl FnMut(usize, [f64; 3])) {
         let first = times.partition_point(|time| *time <= self.starts);
         let end = times.partition_point(|time| *time < self.ends);
-        let within = times.iter().enumerate().take(end).skip(first);
+        let within = (first..end).map(|at| (at, times[at]));
         if let Some(tail) = &self.tail {
-            for (at, &time) in within {
+            for (at, time) in within {
                 tell(at, self.with_tail(tail, time));
             }
         } else {
             let table = &*TABLE;
             let per_sigma = 1.0 / self.sigma;
-            for (at, &time) in within {
+            for (at, time) in within {
                 let z = (time - self.centre) * per_sigma;
                 let (share, density) = share_in(table, z);
                 let by_z = -self.signal * density;

@@ -1,6 +1,6 @@
 //! Long shift registers in the event loop: a bank forms at a clock edge where its flip-flops allow it, shifts a word at a time, and is dissolved by anything else.
 
-use super::{BANKED, Kernel, NONE, RESET_AND_SET};
+use super::{BANKED, Kernel, NONE, NetState, RESET_AND_SET};
 use crate::kernel::compiled::CLOCK;
 use crate::kernel::observer::Observer;
 use crate::kernel::shift_banks::ShiftBank;
@@ -89,6 +89,16 @@ impl Kernel {
         };
         bank.arrives_fs = None;
         self.nets[first].pending = NONE;
+        if !observer.needs_changes() {
+            let both = bank.state.iter().zip(&mut bank.shown);
+            for (&state, shown) in both {
+                self.statistics.changes += u64::from((state ^ *shown).count_ones());
+                *shown = state;
+            }
+            bank.nets_are_late = true;
+            return;
+        }
+        bank.give_values(&mut self.nets);
         let time = Time::from_fs(self.now_fs);
         for (word, nets) in bank.nets.chunks(64).enumerate() {
             let state = bank.state[word];
@@ -106,6 +116,24 @@ impl Kernel {
         }
     }
 
+    /// Before flip-flops on this clock look at D: some of them may look at outputs of a bank.
+    #[inline]
+    pub(super) fn give_values_to(&mut self, clock: usize) {
+        let clock = clock as u32;
+        for bank in &mut self.banks {
+            if bank.nets_are_late && bank.reading_clocks.binary_search(&clock).is_ok() {
+                bank.give_values(&mut self.nets);
+            }
+        }
+    }
+
+    /// Before anybody may look at any net.
+    pub(super) fn give_all_values(&mut self) {
+        for bank in &mut self.banks {
+            bank.give_values(&mut self.nets);
+        }
+    }
+
     /// Gives a bank's states and what is on its way back to its flip-flops.
     #[cold]
     fn dissolve(&mut self, index: usize) {
@@ -113,6 +141,7 @@ impl Kernel {
         if !bank.is_formed {
             return;
         }
+        bank.give_values(&mut self.nets);
         bank.is_formed = false;
         let arrives_fs = bank.arrives_fs.take();
         for stage in 0..bank.cells.len() {
@@ -141,6 +170,19 @@ impl Kernel {
             && let Some(index) = self.banks.iter().position(has)
         {
             self.dissolve(index);
+        }
+    }
+}
+
+impl ShiftBank {
+    /// Gives the nets the values that the outputs show.
+    fn give_values(&mut self, nets: &mut [NetState]) {
+        if !self.nets_are_late {
+            return;
+        }
+        self.nets_are_late = false;
+        for (stage, &net) in self.nets.iter().enumerate() {
+            nets[net as usize].value = Logic::from(self.shows(stage)).bits();
         }
     }
 }

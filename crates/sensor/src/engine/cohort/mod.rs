@@ -48,6 +48,7 @@ mod fine;
 mod grid;
 mod hits;
 mod joint;
+mod kept;
 mod overlap;
 mod pooled;
 mod prepare;
@@ -60,7 +61,7 @@ mod words;
 
 use std::borrow::Cow;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use smallvec::{SmallVec, smallvec};
 
@@ -70,6 +71,7 @@ use self::cycles::LikeCycles;
 pub use self::draw::none_of;
 use self::events::EventTable;
 pub use self::hits::at_least_hit;
+use self::kept::{KeptCohorts, Prepared, Ready};
 use self::recent::Histories;
 pub use self::secondaries::variance_left_out;
 use self::words::RandomWords;
@@ -97,6 +99,8 @@ pub struct Cohort {
     is_event: EventTable,
     /// Whether the law is that of one macropixel, where each has its own.
     is_of_macropixel: bool,
+    /// What was prepared of macropixels, from the first exposure on, if anything is to be kept.
+    kept: Option<Arc<OnceLock<KeptCohorts>>>,
 }
 
 /// How the state of laser cycles alike is kept.
@@ -132,7 +136,16 @@ impl Cohort {
             is_event,
             sensor,
             is_of_macropixel: false,
+            kept: None,
         }
+    }
+
+    /// The same engine for exposures that differ in their seed: what it computes of a macropixel's start value and light is kept, up to 64 MB.
+    #[must_use]
+    pub fn keeping(mut self) -> Self {
+        // With laws of their own macropixels have engines of their own.
+        self.kept = (!self.sensor.has_own_laws()).then(Arc::default);
+        self
     }
 
     /// This engine with the law of a macropixel, where each has its own: what [`Cohort::expected`] and
@@ -209,15 +222,32 @@ impl Cohort {
         start: u16,
         light: &PixelLight,
     ) -> Result<Counts, EngineError> {
-        let mut sums: Counts = smallvec![0; self.sensor.bins];
-        let engine = self.of_macropixel(pixel);
-        let Some(cohorts) = engine.cohorts(stream, start, light)? else {
-            return Ok(sums);
+        let prepared = self.of_macropixel(pixel).prepared(stream, start, light)?;
+        Ok(self.sums_of(&prepared, stream.seed, pixel))
+    }
+
+    /// What the laser cycles of a window are made of.
+    fn prepared(
+        &self,
+        stream: &StreamConfig,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Prepared, EngineError> {
+        let ready = |like: LikeCycles| Ready {
+            way: self.way(&like),
+            like,
         };
-        let random = &mut RandomWords::new(stream.seed, pixel);
+        let cohorts = self.cohorts(stream, start, light)?;
+        Ok(cohorts.map(|cohorts| cohorts.into_iter().map(ready).collect()))
+    }
+
+    /// Draws the counts of a macropixel.
+    fn sums_of(&self, prepared: &Prepared, seed: u64, pixel: u32) -> Counts {
+        let mut sums: Counts = smallvec![0; self.sensor.bins];
+        let random = &mut RandomWords::new(seed, pixel);
         let is_event = &self.is_event;
-        for like in &cohorts {
-            let counts = match self.way(like) {
+        for Ready { like, way } in prepared.iter().flatten() {
+            let counts = match way {
                 Way::Alone => alone::run(like, is_event, random),
                 Way::Pooled => pooled::run(like, is_event, random),
                 Way::Recent(histories) => histories.run(like.cycles, random),
@@ -226,7 +256,7 @@ impl Cohort {
             let compared = sums.iter_mut().zip(counts).skip(like.not_compared);
             compared.for_each(|(sum, count)| *sum += count);
         }
-        Ok(sums)
+        sums
     }
 
     /// The cheapest way that neglects no more than it may.
@@ -304,13 +334,23 @@ impl Expose for Cohort {
         let dark = PixelLight::dark();
         let config = stream.config();
         let mut exposed = Exposed::new(self.sensor.bins);
+        let begun = || KeptCohorts::new(config, self.sensor.pixels());
+        let kept = self.kept.as_ref().map(|kept| kept.get_or_init(begun));
+        let kept = kept.filter(|kept| kept.is_of(config));
         for pixel in pixels {
             let light = pixel.light.as_ref().unwrap_or(&dark);
             let light = match light.has_trains() {
                 true => &stream.with_trains_as_echoes(light, self.sight_fs(config, pixel.start)),
                 false => light,
             };
-            let counts = self.draw(config, pixel.number, pixel.start, light)?;
+            let sums = match kept {
+                Some(kept) => {
+                    let prepared = kept.prepared(self, pixel.number, pixel.start, light)?;
+                    self.sums_of(&prepared, config.seed, pixel.number)
+                }
+                None => self.sums(config, pixel.number, pixel.start, light)?,
+            };
+            let counts = histogram::counts(&self.sensor, sums);
             exposed.histograms.push(&counts);
             let closed = self.opening(pixel.start).window.open().is_none();
             let periods = u64::from(config.stop_periods) * u64::from(config.laser_cycles);

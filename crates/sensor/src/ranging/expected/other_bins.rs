@@ -8,7 +8,7 @@
 //! Chances are of laser cycles that are cut into many: with few counts in each, binomial counts of bins that are taken for independent have
 //! the variances of Poisson numbers. Those of first photons have no more, so that bounds are rather too long there.
 
-use super::{EchoLight, PARAMETERS, Response};
+use super::{EchoLight, OfBins, PARAMETERS, Response};
 use crate::numerics::Dual;
 
 /// How a bin of another sensor counts.
@@ -26,7 +26,7 @@ impl OtherBins {
         self,
         response: &Response,
         light: &EchoLight,
-    ) -> Vec<Dual<K>> {
+    ) -> OfBins<K> {
         let edges: Vec<f64> = (0..=response.bins).map(|edge| edge as f64 - 0.5).collect();
         let [until, by_place, by_width] = response.pulse(light).until_each(&edges);
         let background = light.background_per_bin;

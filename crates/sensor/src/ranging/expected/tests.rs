@@ -268,7 +268,11 @@ proptest! {
         };
         let lights: Vec<EchoLight> = places.iter().zip(&ln_signals).map(light).collect();
         let steps = if is_fine { Steps::Fine } else { Steps::Coarse };
-        let side_by_side = response.chances_of_each::<4>(&lights, steps);
+        let mut side_by_side = Vec::new();
+        response.chances_of_each::<4>(&lights, steps, |number, chances| {
+            assert_eq!(number, side_by_side.len());
+            side_by_side.push(chances.to_vec());
+        });
         prop_assert_eq!(side_by_side.len(), lights.len());
         let most = lights.iter().map(|light| response.steps(light, steps)).max();
         for (light, found) in lights.iter().zip(side_by_side) {
@@ -282,6 +286,45 @@ proptest! {
                     prop_assert!(!is_same || (a - b).abs() < allowed * (1.0 + b.abs()), "{found:?} {alone:?}");
                 }
             }
+        }
+    }
+
+    /// What a thread keeps, of steps and of mean histograms, is to the bit what a new thread finds.
+    #[test]
+    fn what_is_kept_is_what_would_be_found_anew(
+        order in prop::collection::vec((0usize..6, 0usize..2, 0usize..4), 5..60),
+        places in prop::array::uniform6(-6f64..20.0),
+        ln_signals in prop::array::uniform6(-2f64..7.0),
+        dead_times_ns in prop::array::uniform2(2.7f64..40.0),
+        bins in prop::sample::select(vec![4usize, 16, 24]),
+    ) {
+        let responses = dead_times_ns.map(|dead_time_ns| {
+            let config = SensorConfig { dead_time_ns, bins, ..SensorConfig::default() };
+            Response::new(&config, 1.0 / config.clk_hz, PULSE_SIGMA)
+        });
+        let values = |(light, response, slopes): (usize, usize, usize)| {
+            let light = EchoLight {
+                position_bins: places[light],
+                signal: ln_signals[light].exp(),
+                background_per_bin: 0.03,
+                sigma_bins: 0.74,
+            };
+            let response = &responses[response];
+            fn flat<const K: usize>(chances: &[Dual<K>]) -> Vec<f64> {
+                chances.iter().flat_map(|c| std::iter::once(c.value).chain(c.slope)).collect()
+            }
+            match slopes {
+                0 => response.chances(&light),
+                1 => flat(&response.chances_of::<2>(&light, Steps::Fine)),
+                2 => flat(&response.chances_of::<3>(&light, Steps::Fine)),
+                _ => flat(&response.chances_of::<4>(&light, Steps::Fine)),
+            }
+        };
+        for asked in order {
+            let kept = values(asked);
+            let anew = std::thread::scope(|scope| scope.spawn(|| values(asked)).join().unwrap());
+            prop_assert!(kept == anew, "{kept:?} {anew:?}");
+            prop_assert_eq!(kept.len(), bins * [1, 3, 4, 5][asked.2]);
         }
     }
 }

@@ -31,6 +31,12 @@ fn likelihood<'a>(
     }
 }
 
+fn local_at(likelihood: &Likelihood<'_>, light: EchoLight, steps: Steps) -> Local {
+    let mut found = Vec::new();
+    likelihood.at_each(&[light], steps, |_, local| found.push(local));
+    found.remove(0)
+}
+
 /// Parameters in their order.
 fn moved_by(light: &EchoLight, parameter: usize, by: f64) -> EchoLight {
     let mut light = *light;
@@ -118,7 +124,7 @@ proptest! {
             more.iter().zip(less).map(|(more, less)| (more - less) / (2.0 * BY)).collect()
         }).collect();
         let chances = chances(&light);
-        let local = likelihood.at_each(&[light], Steps::Coarse).remove(0);
+        let local = local_at(&likelihood, light, Steps::Coarse);
         let sum = |of: &dyn Fn(usize, f64) -> f64| -> f64 {
             bins.clone().map(|bin| of(bin, chances[bin].clamp(1e-9, 1.0 - 1e-9))).sum()
         };
@@ -196,7 +202,7 @@ fn bins_that_always_count_are_finite() {
     };
     let chances = response.chances(&light);
     assert!(chances.iter().any(|chance| *chance > 1.0 - 1e-12));
-    let local = likelihood.at_each(&[light], Steps::Fine).remove(0);
+    let local = local_at(&likelihood, light, Steps::Fine);
     let numbers = local.score.iter().chain(local.information.iter().flatten());
     assert!(numbers.chain([&local.deviance]).all(|n| n.is_finite()));
 }
