@@ -20,6 +20,7 @@ use smallvec::{SmallVec, smallvec};
 
 use super::spad::{DeadTimeLaw, FEW_SPADS, Photon, SpadEvent, SpadModel};
 use super::spad_grid::SpadGrid;
+use super::spad_rows::SpadRows;
 use super::stream::{OrderedEchoes, PixelStream};
 use crate::units::Time;
 
@@ -112,6 +113,20 @@ impl<'a> Avalanches<'a> {
         let known = self.run(photons, None, forever, forever, edges);
         debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
         self.lost
+    }
+
+    /// Runs the photons of `rows`, which begin at `from`, where the state is known and no avalanche causes another.
+    pub(crate) fn run_rows(
+        &mut self,
+        rows: &SpadRows,
+        light: &PixelStream<'_>,
+        from: Time,
+        edges: &mut Vec<SpadEvent>,
+    ) {
+        let before = edges.len();
+        let known = rows.run(light, from, Some(&mut self.blind_until), from, edges);
+        debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
+        self.lost += (rows.photons() - (edges.len() - before)) as u64;
     }
 
     /// Runs `photons`, sorted and all before `until`, and what they cause before that time, and the photons of `echoes`.

@@ -17,6 +17,7 @@ pub mod solar;
 mod spad;
 mod spad_grid;
 mod spad_layout;
+mod spad_rows;
 mod stream;
 mod tail;
 
@@ -36,9 +37,11 @@ pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
 pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, MOST_SPREAD, Photon, SpadEvent, SpadModel,
+    sort_photons,
 };
 pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use spad_layout::SpadLayout;
+pub use spad_rows::SpadRows;
 pub use stream::{
     Background, Draw, GROUP, Group, LightParts, ListedEchoes, NEVER_FS, OrderedEchoes, PER_BLOCK,
     PLACE_BITS, PhotonStream, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE, TIME_BITS,

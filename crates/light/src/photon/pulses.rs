@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 
 use super::light::PixelLight;
-use super::spad::{Photon, SpadEvent};
+use super::spad::{Photon, SpadEvent, sort_photons};
+use super::spad_rows::SpadRows;
 use super::stream::{ByCycle, Draw, ListedEchoes, PhotonStream, PixelStream, SPAD_SHIFT};
 use crate::units::Time;
 
@@ -140,6 +141,11 @@ impl PhotonStream {
         let earliest_fs = parts.iter().map(|part| part.echo_fs.0).min();
         let earliest = Time::from_fs(earliest_fs.unwrap_or(0));
         let (mut drawn, mut next_echo) = (0, 0);
+        let are_apart = !config.spads.has_secondaries() && !parts[0].has_ordered_echo();
+        let mut rows = SpadRows::default();
+        let mut later: Vec<Photon> = Vec::new();
+        let mut keys = Vec::new();
+        let mut from = Time::ZERO;
         for cycle in 0..config.laser_cycles {
             let until = match cycle + 1 < config.laser_cycles {
                 true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs),
@@ -157,18 +163,25 @@ impl PhotonStream {
             }
             for light in parts {
                 for block in 0..light.blocks() {
-                    light.push_block(cycle, block, &mut photons);
+                    light.push_block(cycle, block, i64::MAX, &mut photons);
                 }
             }
-            photons.retain(|photon| photon.time < end);
-            photons.sort_unstable();
-            let now = photons.partition_point(|photon| photon.time < until);
+            later.extend(photons.iter().filter(|photon| photon.time >= until));
+            photons.retain(|photon| photon.time < until);
+            later.retain(|photon| photon.time < end);
+            drawn += photons.len() as u64;
             edges.clear();
-            let known =
-                avalanches.run(&photons[..now], Some(&mut echoes), until, until, &mut edges);
-            debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
-            photons.drain(..now);
-            drawn += now as u64;
+            if are_apart && rows.put(&parts[0], &photons, from, until) {
+                avalanches.run_rows(&rows, &parts[0], from, &mut edges);
+            } else {
+                sort_photons(&mut photons, from, &mut keys);
+                let echoes = (!echoes.is_empty()).then_some(&mut echoes);
+                let known = avalanches.run(&photons, echoes, until, until, &mut edges);
+                debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
+            }
+            photons.clear();
+            std::mem::swap(&mut photons, &mut later);
+            from = until;
             echoes.forget_before(until);
             if pulses(&edges).is_break() {
                 break;

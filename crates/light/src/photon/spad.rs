@@ -85,6 +85,24 @@ impl From<SpadEvent> for Photon {
     }
 }
 
+/// Sorts photons, none of which comes before `from`, as words of time, SPAD (7 bits) and whether they breed; `keys` is room for these. Those of a laser
+/// cycle, some twenty, took 8 % of the time of a drive at night in bright macropixels when whole photons were compared.
+pub fn sort_photons(photons: &mut [Photon], from: Time, keys: &mut Vec<u64>) {
+    keys.clear();
+    keys.extend(photons.iter().map(|photon| {
+        let since_fs = (photon.time - from).as_fs() as u64;
+        since_fs << 8 | u64::from(photon.spad) << 1 | u64::from(photon.breeds)
+    }));
+    keys.sort_unstable();
+    for (photon, key) in photons.iter_mut().zip(keys) {
+        *photon = Photon::new(
+            from + Time::from_fs((*key >> 8) as i64),
+            (*key >> 1 & 0x7f) as u8,
+            *key % 2 != 0,
+        );
+    }
+}
+
 /// What an avalanche in a blind SPAD does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DeadTimeLaw {

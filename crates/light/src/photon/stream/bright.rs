@@ -147,6 +147,40 @@ impl<'a> PixelStream<'a> {
             / (self.gap_fs * self.stream.spads() as f64)
     }
 
+    /// Mean number of photons of a SPAD within a time after the start of a laser cycle, averaged over the exposure. Those of an ordered echo, and of other
+    /// lasers, are left out; a measured pulse is taken for even.
+    pub fn photons_within(&self, within_fs: &Range<i64>) -> f64 {
+        let cycle_fs = self.stream.cycle_fs;
+        let profile = self.limits.as_ref().and_then(|l| l.profile.as_ref());
+        let background = match profile {
+            None => (within_fs.end - within_fs.start) as f64 / self.gap_fs,
+            Some(profile) => {
+                let (from_fs, until_fs) = (within_fs.start as f64, within_fs.end as f64);
+                let before_fs = cycle_fs as f64;
+                profile.photons(from_fs, until_fs)
+                    + profile.photons(from_fs + before_fs, until_fs.min(0.0) + before_fs)
+            }
+        };
+        let mut photons = background / self.stream.spads() as f64;
+        if self.has_listed_echo() && self.foreign.is_none() {
+            let until = |time_fs: i64| match self.shape {
+                None => self.passed_until(time_fs),
+                Some(_) => {
+                    let (first_fs, last_fs) = self.echo_fs;
+                    let passed = (time_fs - first_fs) as f64 / (last_fs - first_fs).max(1) as f64;
+                    self.signal_per_spad * passed.clamp(0.0, 1.0)
+                }
+            };
+            for later in self.echoes_within(within_fs) {
+                let moved_fs = later * cycle_fs;
+                photons += until(within_fs.end - moved_fs) - until(within_fs.start - moved_fs);
+            }
+        }
+        let laser_cycles = self.stream.config.laser_cycles;
+        let lit = self.limits.as_ref().map(|limits| limits.cycles.len());
+        photons * lit.map_or(1.0, |lit| lit as f64 / f64::from(laser_cycles))
+    }
+
     /// Whether photons of the echo are drawn only where their SPAD is ready ([`OrderedEchoes`](super::OrderedEchoes)).
     ///
     /// Such an echo has to be followed from its beginning. Where echoes come one upon the other, that would be from the
@@ -220,8 +254,9 @@ impl<'a> PixelStream<'a> {
         }
     }
 
-    /// Appends the background photons of one block of one laser cycle, in their order; those before the exposure are none.
-    pub fn push_block(&self, cycle: u32, block: u32, photons: &mut Vec<Photon>) {
+    /// Appends the background photons of one block of one laser cycle that come before `until_fs` after the start of the cycle, in their order; those
+    /// before the exposure are none.
+    pub fn push_block(&self, cycle: u32, block: u32, until_fs: i64, photons: &mut Vec<Photon>) {
         if !self.gap_fs.is_finite() || !self.draws_background_in(cycle) {
             return;
         }
@@ -231,7 +266,7 @@ impl<'a> PixelStream<'a> {
             return;
         }
         let gap_fs = self.gap_fs / share;
-        let length = (block_fs.end - block_fs.start) as f64;
+        let length = (block_fs.end.min(until_fs) - block_fs.start) as f64;
         let start = self.stream.cycle_start(cycle);
         let mut at = 0.0;
         for chunk in 0.. {

@@ -7,9 +7,17 @@
 //!   second         │     │             │          cycles that have fewer draw none that is kept
 //! ```
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
+use multiversion::multiversion;
+
 use super::bright::{PER_BLOCK, TILE};
 use super::part::{PixelStream, nearest};
 use crate::photon::philox::blocks_from;
+use crate::photon::quantile::NormalSampler;
 use crate::photon::spad::Photon;
 use crate::units::Time;
 
@@ -83,27 +91,48 @@ impl ListedEchoes {
         }
         let end = stream.cycle_start(config.laser_cycles);
         let spad_shift = u32::BITS - config.spads.grid.bits();
+        let starts: [Time; TILE] =
+            std::array::from_fn(|lane| stream.cycle_start(first_cycle + lane as u32));
+        let mut after_fs = [0.0; TILE];
         self.photons.iter_mut().for_each(Vec::clear);
         for photon in 0..numbers.into_iter().max().unwrap_or(0) {
-            let [lows, highs, ..] = draw(2 * photon);
+            let words = draw(2 * photon);
+            let [lows, highs, ..] = &words;
+            displacements(&light.gaussian, [lows, highs], &mut after_fs);
             let of_shape = light.shape.as_ref();
-            let of_shape = of_shape.map(|shape| (shape, draw(2 * photon + 1)));
-            for lane in (0..TILE).filter(|&lane| numbers[lane] > photon) {
-                let (low, high) = (lows[lane], highs[lane]);
-                let cycle = first_cycle + lane as u32;
-                let mut after_fs = light.gaussian.draw(u64::from(low) | u64::from(high) << 32);
-                if let Some((shape, words)) = &of_shape {
-                    after_fs += shape.draw(words.map(|row| row[lane]));
+            if let Some((shape, words)) = of_shape.map(|shape| (shape, draw(2 * photon + 1))) {
+                for lane in (0..TILE).filter(|&lane| numbers[lane] > photon) {
+                    after_fs[lane] += shape.draw(words.map(|row| row[lane]));
                 }
-                let after = Time::from_fs(light.arrival_fs + nearest(after_fs));
-                let time = stream.cycle_start(cycle) + after;
+            }
+            for lane in (0..TILE).filter(|&lane| numbers[lane] > photon) {
+                let after = Time::from_fs(light.arrival_fs + nearest(after_fs[lane]));
+                let time = starts[lane] + after;
+                let (low, high) = (lows[lane], highs[lane]);
                 let spad = (u64::from(high) >> spad_shift) as u8;
+                let cycle = first_cycle + lane as u32;
                 if (Time::ZERO..end).contains(&time) && light.keeps_signal(cycle, spad, [low, high])
                 {
                     self.photons[lane].push(Photon::new(time, spad, light.breeds()));
                 }
             }
         }
+    }
+}
+
+/// Gaussian draws of photons from their low and high words.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
+fn displacements(
+    gaussian: &NormalSampler,
+    [lows, highs]: [&[u32; TILE]; 2],
+    after_fs: &mut [f64; TILE],
+) {
+    for ((&low, &high), after_fs) in lows.iter().zip(highs).zip(after_fs) {
+        *after_fs = gaussian.draw(u64::from(low) | u64::from(high) << 32);
     }
 }
 

@@ -70,7 +70,7 @@ impl<'a> PixelStream<'a> {
     }
 
     /// The intensity of the echo on a SPAD until `time_fs` after the start of its cycle, photons.
-    fn passed_until(&self, time_fs: i64) -> f64 {
+    pub(super) fn passed_until(&self, time_fs: i64) -> f64 {
         let (after_fs, sigma_fs) = ((time_fs - self.arrival_fs) as f64, self.gaussian.sigma);
         if sigma_fs == 0.0 {
             return if after_fs >= 0.0 {

@@ -26,6 +26,7 @@ use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
 use crate::engine::Work;
 use crate::photon::{
     Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
+    SpadRows,
 };
 use crate::units::Time;
 use spacing::Spacing;
@@ -75,6 +76,8 @@ pub(super) struct Counting<'a> {
     placed: Vec<(SpadEvent, usize)>,
     /// Of each part of bright light.
     listed: Vec<ListedEchoes>,
+    /// Photons of one cycle of bright light, by SPAD and time.
+    rows: SpadRows,
     /// Laser cycles side by side, in bright light.
     tile: Option<Box<Tile>>,
 }
@@ -212,6 +215,7 @@ impl<'a> Counting<'a> {
             events: Vec::new(),
             placed: Vec::new(),
             listed: Vec::new(),
+            rows: SpadRows::default(),
             tile: None,
         }
     }
@@ -472,6 +476,26 @@ impl Placed<'_> {
     fn is_seen(&self, time: Time) -> bool {
         let is_inside = self.sight.rows.are_around((time - self.start).as_fs());
         is_inside.unwrap_or_else(|| self.row_of(time).is_some())
+    }
+
+    /// How many photons are within the window.
+    fn count_seen(&self, photons: &[Photon]) -> usize {
+        let [first_fs, .., end_fs] = *self.sight.rows.edges_fs() else {
+            return 0;
+        };
+        let mut seen = 0;
+        for photon in photons {
+            let time_fs = (photon.time - self.start).as_fs();
+            let is_near = (time_fs - first_fs).abs() <= ROUNDING_FS
+                || (time_fs - end_fs).abs() <= ROUNDING_FS;
+            let is_seen = if is_near {
+                self.is_seen(photon.time)
+            } else {
+                first_fs <= time_fs && time_fs < end_fs
+            };
+            seen += usize::from(is_seen);
+        }
+        seen
     }
 
     /// Bin + 1 of a time, if it is within the window.

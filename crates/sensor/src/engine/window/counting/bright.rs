@@ -3,12 +3,64 @@
 //! Each window begins some blocks of photons before its first bin, with SPADs of which nothing is known. Where that was
 //! not enough to know them in the window, it begins anew twice as far back.
 
+use std::ops::Range;
+
 use smallvec::SmallVec;
 
 use super::super::sight::ROUNDING_FS;
 use super::{BREEDING, Counting, Pixel, Placed};
-use crate::photon::{ListedEchoes, Photon, PhotonStream, PixelStream, TILE};
+use crate::chip::MOST_SPADS;
+use crate::photon::{ListedEchoes, Photon, PhotonStream, PixelStream, TILE, sort_photons};
 use crate::units::Time;
+
+/// Dead times before a window that are looked at for gaps.
+const MOST_DEAD_TIMES: i64 = 64;
+
+/// What a laser cycle costs beside its photons, in photons. Chosen.
+const CYCLE_COST: f64 = 30.0;
+
+/// So few SPADs that are not known, on average, are none.
+const FEW_UNKNOWN: f64 = 1e-3;
+
+/// How many dead times before a window its photons are drawn from at first, where twice as many are drawn if SPADs are not known then: `usual`, unless another number
+/// costs less than half. A SPAD has `in_window` photons in the window on average, and `in_dead_time` of a number in that dead time before it. It is known
+/// after a dead time without photons.
+fn cheaper_look_back(
+    usual: i64,
+    in_window: f64,
+    in_dead_time: impl Fn(i64) -> f64,
+    spads: f64,
+) -> i64 {
+    // Cost of an attempt, and chance that it fails, by dead times from one on.
+    let mut attempts = SmallVec::<[(f64, f64); MOST_DEAD_TIMES as usize]>::new();
+    let (mut photons, mut gaps) = (in_window, 0.0);
+    for back in 1..=MOST_DEAD_TIMES {
+        let before = in_dead_time(back);
+        photons += before;
+        let none = libm::exp(-before);
+        gaps += before * none - libm::log1p(-none.min(1.0 - 1e-9));
+        let unknown = spads * libm::exp(-gaps);
+        attempts.push((CYCLE_COST + spads * photons, unknown.min(1.0)));
+        if unknown < FEW_UNKNOWN && back >= usual {
+            break;
+        }
+    }
+    let last = attempts.len() - 1;
+    let (mut cheapest, mut least) = (last, attempts[last].0);
+    for at in (0..last).rev() {
+        let next = attempts[(2 * at + 1).min(last)].0;
+        attempts[at].0 += attempts[at].1 * next;
+        if attempts[at].0 < least {
+            (cheapest, least) = (at, attempts[at].0);
+        }
+    }
+    let of_usual = attempts[(usual as usize - 1).min(last)].0;
+    if of_usual > 2.0 * least {
+        cheapest as i64 + 1
+    } else {
+        usual
+    }
+}
 
 /// The beginning of a block of photons.
 #[derive(Debug, Clone, Copy)]
@@ -99,17 +151,30 @@ impl Counting<'_> {
     }
 
     /// How long before a window its photons are drawn from at first: two dead times, and more where gaps are rarer. With two
-    /// alone, 1600 Mcounts/s took 24 s where 400 took 3.6; with this 17 and 4.0. Never nothing, which doubling would leave
+    /// alone, 1600 Mcounts/s took 24 s where 400 took 3.6; with this 17 and 4.0. Where light has several layers, the photons of
+    /// each dead time may ask for another number ([`cheaper_look_back`]). Never nothing, which doubling would leave
     /// as it is: without a dead time, it is afterpulses that make the state unknown.
     fn first_look_back(&self, pixel: &Pixel<'_>) -> Time {
-        let dead_time = self.stream.config().spads.dead_time;
+        let config = self.stream.config();
+        let dead_time = config.spads.dead_time;
         let plain = pixel.parts.iter().filter(|part| !part.breeds());
         // The rate near the window counts; ten dead times before it are near.
-        let before_fs = 10 * dead_time.as_fs();
-        let within_fs = pixel.sight.first_fs - before_fs..pixel.sight.until_fs;
-        let photons: f64 = plain.map(|part| part.per_dead_time(&within_fs)).sum();
-        let dead_times = dead_time * (2 + (8.0 * photons) as i64);
-        dead_times.max(self.stream.config().clock.period())
+        let (first_fs, dead_fs) = (pixel.sight.first_fs, dead_time.as_fs());
+        let within_fs = first_fs - 10 * dead_fs..pixel.sight.until_fs;
+        let near = plain.clone().map(|part| part.per_dead_time(&within_fs));
+        let mut dead_times = 2 + (8.0 * near.sum::<f64>()) as i64;
+        if !pixel.light.is_alone {
+            let photons = |within_fs: Range<i64>| {
+                let photons = plain.clone().map(|part| part.photons_within(&within_fs));
+                photons.sum::<f64>()
+            };
+            let before = |back: i64| first_fs - back * dead_fs..first_fs - (back - 1) * dead_fs;
+            let in_window = photons(first_fs..pixel.sight.until_fs);
+            let spads = self.stream.spads() as f64;
+            let in_dead_time = |back| photons(before(back));
+            dead_times = cheaper_look_back(dead_times, in_window, in_dead_time, spads);
+        }
+        (dead_time * dead_times).max(config.clock.period())
     }
 
     /// Counts the window of one laser cycle.
@@ -135,20 +200,31 @@ impl Counting<'_> {
                 self.push_photons(pixel, part, begin, &window);
             }
             let known_from = begin.time.unwrap_or(Time::ZERO);
-            self.photons.retain(|photon| photon.time >= known_from);
             let is_later = |photon: &&Photon| photon.time >= known_from;
             self.photons
                 .extend(breeding_photons.iter().filter(is_later));
-            self.sort_photons(known_from);
-            let earlier = breeding_photons
-                .iter()
-                .filter(|photon| photon.time < known_from);
-            let mut avalanches = pixel.light.avalanches(begin.time, earlier.copied());
             let mut echoes = pixel.light.ordered_echoes();
             for cycle in self.echoes(pixel.light, known_from, &window) {
                 echoes.add(cycle);
             }
             self.events.clear();
+            let are_apart = breeding_photons.is_empty() && echoes.is_empty();
+            if are_apart && self.rows.put(pixel.light, &self.photons, known_from, until) {
+                let mut ready = [Time::from_fs(-1); MOST_SPADS];
+                let before = begin.time.is_none().then_some(&mut ready[..]);
+                let (rows, events) = (&self.rows, &mut self.events);
+                let known = rows.run(pixel.light, known_from, before, wanted_from, events);
+                if known.is_ok() {
+                    break self.photons.len() as u64;
+                }
+                back = back * 2;
+                continue;
+            }
+            sort_photons(&mut self.photons, known_from, &mut self.keys);
+            let earlier = breeding_photons
+                .iter()
+                .filter(|photon| photon.time < known_from);
+            let mut avalanches = pixel.light.avalanches(begin.time, earlier.copied());
             let (photons, events) = (&self.photons, &mut self.events);
             let seen = Some(&mut echoes).filter(|echoes| !echoes.is_empty());
             let known = avalanches.run(photons, seen, until, wanted_from, events);
@@ -159,29 +235,9 @@ impl Counting<'_> {
         };
         pixel.near = near;
         pixel.work.photons_drawn += drawn;
-        let seen = self.photons.iter();
-        let seen = seen.filter(|photon| window.is_seen(photon.time)).count();
+        let seen = window.count_seen(&self.photons);
         let pulses = self.count_events(pixel, &window);
         pixel.work.lost_to_dead_time += (seen as u64).saturating_sub(pulses);
-    }
-
-    /// Sorts `photons`, none of which comes before `from`, as words of time, SPAD (7 bits) and whether they breed. Those of a laser cycle, some twenty, took 8 % of the time of a drive at night
-    /// in bright macropixels when whole photons were compared.
-    fn sort_photons(&mut self, from: Time) {
-        let key = |photon: &Photon| {
-            let since_fs = (photon.time - from).as_fs() as u64;
-            since_fs << 8 | u64::from(photon.spad) << 1 | u64::from(photon.breeds)
-        };
-        self.keys.clear();
-        self.keys.extend(self.photons.iter().map(key));
-        self.keys.sort_unstable();
-        for (photon, key) in self.photons.iter_mut().zip(&self.keys) {
-            *photon = Photon::new(
-                from + Time::from_fs((key >> 8) as i64),
-                (key >> 1 & 0x7f) as u8,
-                key % 2 != 0,
-            );
-        }
     }
 
     /// Laser cycles whose echoes may have photons between a time and the end of a window.
@@ -267,7 +323,8 @@ impl Counting<'_> {
                 self.stream.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start)
             };
             while cycle < laser_cycles && begins(cycle, block) < until {
-                light.push_block(cycle, block, &mut self.photons);
+                let until_fs = (until - self.stream.cycle_start(cycle)).as_fs();
+                light.push_block(cycle, block, until_fs, &mut self.photons);
                 block += 1;
                 if block == light.blocks() {
                     (cycle, block) = (cycle + 1, 0);
@@ -275,10 +332,12 @@ impl Counting<'_> {
             }
         }
         let from = begin.time.unwrap_or(Time::ZERO);
+        // What breeds is asked for before `from`, too.
+        let is_wanted =
+            |photon: &&Photon| (light.breeds() || photon.time >= from) && photon.time < until;
         for cycle in self.echoes(light, from, window) {
-            let echo = self.listed[part].of(light, cycle);
-            self.photons.extend_from_slice(echo);
+            let echo = self.listed[part].of(light, cycle).iter();
+            self.photons.extend(echo.filter(is_wanted));
         }
-        self.photons.retain(|photon| photon.time < until);
     }
 }
