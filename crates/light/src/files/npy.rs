@@ -239,9 +239,7 @@ impl NpyHead {
         let kind = self.descr.trim_matches(['\'', '<', '>', '|', '=']);
         let (sort, width) = kind.split_at_checked(1)?;
         let width = match (sort, width) {
-            ("u" | "i", "1" | "2" | "4" | "8") | ("f", "4" | "8") | ("b", "1") => {
-                width.parse().ok()?
-            }
+            ("u" | "i", "1" | "2" | "4" | "8") | ("f", "4" | "8") => width.parse().ok()?,
             _ => return None,
         };
         let number = |bytes: &[u8]| {
@@ -253,7 +251,7 @@ impl NpyHead {
             let bits = u64::from_le_bytes(least_first);
             let unused = 64 - 8 * width as u32;
             match (sort, width) {
-                ("u" | "b", _) => Number::Whole(bits.into()),
+                ("u", _) => Number::Whole(bits.into()),
                 ("i", _) => Number::Whole(((bits << unused) as i64 >> unused).into()),
                 (_, 4) => Number::Float(f32::from_bits(bits as u32).into()),
                 _ => Number::Float(f64::from_bits(bits)),

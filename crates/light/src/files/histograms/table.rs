@@ -143,7 +143,11 @@ fn read_array(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u
         ))
     };
     let mut reader = BufReader::new(open_input(path)?);
-    let head = NpyHead::read(&mut reader).map_err(|e| broken(&e))?;
+    let mut head = NpyHead::read(&mut reader).map_err(|e| broken(&e))?;
+    // Truth values are bytes of 0 and 1: one photon or none.
+    if head.descr == "'|b1'" {
+        head.descr = "'|u1'".into();
+    }
     let Some(&bins) = head.shape.last() else {
         return Err(complain(
             "is a single number; give an array whose last axis is bins".into(),
@@ -241,6 +245,15 @@ mod tests {
         assert!(said("[[1, 2], [3, null]]").contains("zone 1 has `null` in bin 1"));
         assert!(said("{\"a\": [1, 2]}").contains("not a list"));
         assert!(read("a.npz", b"PK").unwrap_err().contains("from Python"));
+    }
+
+    #[test]
+    fn truth_values_are_photons() {
+        let mut file = Vec::new();
+        write_npy(&mut file, &[2, 2], &[1u8, 0, 0, 1]).unwrap();
+        let kind = file.windows(3).position(|three| three == b"|u1").unwrap();
+        file[kind..kind + 3].copy_from_slice(b"|b1");
+        assert_eq!(read("counts.npy", &file), Ok(zones(2, &[1, 0, 0, 1])));
     }
 
     proptest! {
