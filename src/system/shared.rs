@@ -133,7 +133,7 @@ impl SharedWork {
         let key = (
             Arc::clone(look),
             scene.lidar.clone(),
-            scene.light.clone(),
+            scene.light,
             *cohort,
         );
         let keeping = |_: &_| Ok::<_, std::convert::Infallible>(engine().keeping());
@@ -194,7 +194,7 @@ impl Look {
 
     /// The light of an exposure to `scene`, which has this look, on the SPADs of `stream`, which are the sensor's.
     pub(super) fn light(&self, scene: &Scene, stream: &PhotonStream) -> Arc<Vec<PixelLight>> {
-        let key = (scene.lidar.clone(), scene.light.clone());
+        let key = (scene.lidar.clone(), scene.light);
         let light = |_: &_| {
             let light = light_in(&self.exposure, scene, &self.truth(), stream);
             Ok::<_, std::convert::Infallible>(light)

@@ -155,7 +155,10 @@ fn cnh_log() -> String {
     text
 }
 
-const SAMPLES: [(&str, fn() -> String, &str, usize); 3] = [
+/// Name, text, words of the command, zones.
+type Log = (&'static str, fn() -> String, &'static str, usize);
+
+const SAMPLES: [Log; 3] = [
     (
         "tmf882x.log",
         tmf882x_log,

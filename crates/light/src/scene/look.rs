@@ -29,7 +29,7 @@ impl Light {
     fn without_strength(&self) -> Self {
         Light {
             illuminance_klux: 0.0,
-            ..self.clone()
+            ..*self
         }
     }
 }
