@@ -130,12 +130,7 @@ impl SharedWork {
         if self.seeds < 2 {
             return Arc::new(engine());
         }
-        let key = (
-            Arc::clone(look),
-            scene.lidar.clone(),
-            scene.light,
-            *cohort,
-        );
+        let key = (Arc::clone(look), scene.lidar.clone(), scene.light, *cohort);
         let keeping = |_: &_| Ok::<_, std::convert::Infallible>(engine().keeping());
         let Ok(engine) = self.engines.get(key, keeping);
         engine
