@@ -167,11 +167,10 @@ impl View {
         let stop = exposure.stop(cycle);
         let mut marks = vec![Mark::new(origin + stop, "STOP")];
         if let Some(window) = self.window.filter(|_| pixel == self.pixels[0]) {
-            let bins = self.law.sensor().bins as i64;
-            let edge = |bin: i64| self.law.bin_interval(&window, cycle, bin).start;
+            let seen = self.law.interval_in(&window, cycle);
             for (time, name) in [
-                (edge(0), "window begins"),
-                (edge(bins), "window ends"),
+                (seen.start, "window begins"),
+                (seen.end, "window ends"),
                 (stop + window.strobe_cause, "strobe"),
             ] {
                 marks.push(Mark::new(origin + time, name));
