@@ -1,4 +1,4 @@
-//! Prose of the book, the other documents and CONTRIBUTING keeps to the rules of CONTRIBUTING (*How to write*): none of the phrases below, and
+//! Prose of the book, the other documents, README and CONTRIBUTING keeps to the rules of CONTRIBUTING (*How to write*): none of the phrases below, and
 //! sentences of at most 18 words on average in every chapter.
 //!
 //! Phrases are looked for in paragraphs, lists, tables and headings. Only sentences of paragraphs and lists are counted. Blocks of code are
@@ -78,9 +78,11 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Name and text of CONTRIBUTING, and of every file of documents that is not generated.
+/// Name and text of README and CONTRIBUTING, and of every file of documents that is not generated.
 fn documents() -> Vec<(String, String)> {
-    let mut paths: Vec<PathBuf> = vec![root().join("CONTRIBUTING.md")];
+    let mut paths: Vec<PathBuf> = ["README.md", "CONTRIBUTING.md"]
+        .map(|name| root().join(name))
+        .to_vec();
     for folder in ["docs", "docs/src", "docs/src/commands"] {
         for entry in std::fs::read_dir(root().join(folder)).unwrap() {
             paths.push(entry.unwrap().path());
