@@ -21,11 +21,13 @@ fn files(folder: &Path, extension: &str) -> Vec<String> {
     names
 }
 
-/// Signals that a GTKWave view shows, buses without their range.
+/// Signals that a GTKWave view shows, by their own names, buses without their range.
 fn shown(view: &str) -> Vec<&str> {
     let lines = view
         .lines()
         .filter(|line| !line.starts_with(['[', '@', '-', '*']));
+    // After the name that it has in the view.
+    let lines = lines.map(|line| line.split("} ").last().unwrap());
     let whole = lines.map(|line| line.split('[').next().unwrap());
     whole.filter(|line| !line.is_empty()).collect()
 }
