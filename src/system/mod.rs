@@ -45,5 +45,6 @@ pub(crate) use shared::SharedWork;
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};
 pub use summary::Summary;
+pub(crate) use summary::median;
 pub use taken::{TakenFrame, TakenPixel, TakenSettings};
 pub use tolerance::{Kept, OnWindow, Tolerance};

@@ -111,7 +111,7 @@ impl PartialEq for Look {
 }
 
 impl SharedWork {
-    /// Of frames that come with so many seeds.
+    /// For frames with the same settings but `seeds` different seeds.
     pub(crate) fn new(seeds: u64) -> Self {
         let kept_seeds = seeds.clamp(1, MOST_SEEDS) as usize;
         SharedWork {

@@ -124,7 +124,8 @@ fn rms(values: &[f64]) -> Option<f64> {
     mean(&squares).map(f64::sqrt)
 }
 
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+/// The median, between the middle two of an even number of values; `None` of none.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     let middle = sorted.len() / 2;

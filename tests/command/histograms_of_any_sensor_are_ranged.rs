@@ -304,6 +304,9 @@ fn what_is_missing_or_impossible_is_said_in_a_sentence() {
     let folder = folder.path();
     std::fs::write(folder.join("counts.csv"), table().0).unwrap();
     std::fs::write(folder.join("rates.csv"), "1.5,2\n3,4\n").unwrap();
+    // As of a TMF8829 whose zones have 256 bins.
+    let finer = r#"{"Result_Set": [{"mp_histo": [[{"bin": [1, 2, 3, 9, 1, 1]}]], "ref_histo": [{"bin": [5, 1, 0]}]}]}"#;
+    std::fs::write(folder.join("finer.json"), finer).unwrap();
     let bins = "--bin-width-ns 1 --pulse-fwhm-ns 2";
     let counts = "range --format counts --histograms counts.csv";
     for (words, says) in [
@@ -334,6 +337,10 @@ fn what_is_missing_or_impossible_is_said_in_a_sentence() {
         (
             format!("range --format counts --histograms rates.csv {bins}"),
             "--counts-per-unit",
+        ),
+        (
+            format!("range --format tmf8829 --histograms finer.json {bins}"),
+            "a reference histogram of 3 bins beside zones of 6; say when bin 0 begins with --start-ns",
         ),
         (
             format!("range --format tmf8829 --histograms counts.csv {bins}"),

@@ -1,5 +1,6 @@
 //! `gdtof range` of any sensor's histograms: tables, arrays, and logs of evaluation kits. No chip of ours is pretended.
 
+use std::f64::consts::LN_2;
 use std::ops::Range;
 use std::path::Path;
 
@@ -7,15 +8,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::args::{Counts, RangeArgs};
+use super::returns::{shown, write_further, write_further_head};
 use crate::cli::voice::{note, say_json, tell};
 use crate::files::{HistogramFormat, Histograms, InputError, OutputFile, ZoneCounts};
 use crate::ranging::{Counted, DepthOptions, DetectedReturn, Detector, NoReturn};
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
-use crate::system::RETURNS;
-
-/// Full width at half maximum of a Gaussian over its standard deviation.
-const FWHM_PER_SIGMA: f64 = 2.354_820_045;
+use crate::system::median;
 
 /// Counts that two histograms do not share by chance.
 const TOO_MANY_FOR_CHANCE: u64 = 200;
@@ -53,6 +52,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
     let kept = args.bins.as_deref().map(bins).transpose()?;
     let mut histograms = Histograms::read(&args.histograms, format, args.counts_per_unit)?;
     let first_bin = kept.as_ref().map_or(0, |kept| kept.start);
+    let whole_bins = histograms.bins;
     if let Some(kept) = kept {
         if kept.end > histograms.bins {
             let message = format!(
@@ -81,7 +81,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
     let detector = detector_of(args, histograms.bins)?;
     let zones: Vec<Zone> = (histograms.captures.par_iter().enumerate())
         .map(|(number, capture)| {
-            let begins_s = begins_s(args, &detector, capture, number)?;
+            let begins_s = begins_s(args, &detector, (number, capture), whole_bins)?;
             let detector = Detector {
                 begins_s: begins_s + first_bin as f64 * detector.bin_s,
                 ..detector
@@ -143,8 +143,8 @@ fn range(
 fn begins_s(
     args: &RangeArgs,
     detector: &Detector,
-    capture: &ZoneCounts,
-    number: usize,
+    (number, capture): (usize, &ZoneCounts),
+    whole_bins: usize,
 ) -> Result<f64, InputError> {
     if let Some(start_ns) = args.start_ns {
         return Ok(1e-9 * start_ns);
@@ -152,12 +152,17 @@ fn begins_s(
     let Some(reference) = &capture.reference else {
         return Ok(0.0);
     };
-    detector.begins_after_reference_s(reference).ok_or_else(|| {
-        let message = format!(
-            "capture {number} has no pulse in its reference histogram; say when bin 0 begins with --start-ns"
-        );
+    let complain = |what: String| {
+        let message = format!("capture {number} has {what}; say when bin 0 begins with --start-ns");
         InputError::new(args.histograms.display(), message)
-    })
+    };
+    if reference.len() != whole_bins {
+        let bins = reference.len();
+        let what = format!("a reference histogram of {bins} bins beside zones of {whole_bins}");
+        return Err(complain(what));
+    }
+    let begins_s = detector.begins_after_reference_s(reference);
+    begins_s.ok_or_else(|| complain("no pulse in its reference histogram".into()))
 }
 
 /// The detector of the options, all of which are checked.
@@ -194,7 +199,7 @@ fn detector_of(args: &RangeArgs, bins: usize) -> Result<Detector, InputError> {
         bins,
         bin_s: 1e-9 * bin_ns,
         begins_s: 0.0,
-        pulse_sigma_s: 1e-9 * fwhm_ns / FWHM_PER_SIGMA,
+        pulse_sigma_s: 1e-9 * fwhm_ns / (8.0 * LN_2).sqrt(),
         counted,
     })
 }
@@ -231,9 +236,9 @@ fn table(args: &RangeArgs, zones: &[Zone]) -> Table {
     }
     table.push("zones with a depth", format!("{} of {all}", firsts.len()));
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.4} m"));
-    let depths = firsts.iter().map(|first| first.depth_m).collect();
+    let depths = firsts.iter().map(|first| first.depth_m);
     table.push("median depth", metres(median(depths)));
-    let bounds = firsts.iter().filter_map(|first| first.bound_m).collect();
+    let bounds = firsts.iter().filter_map(|first| first.bound_m);
     table.push(
         "median bound, one standard deviation",
         metres(median(bounds)),
@@ -246,7 +251,7 @@ fn table(args: &RangeArgs, zones: &[Zone]) -> Table {
     if !beside.is_empty() {
         let count = beside.len();
         let name = format!("median depth less the sensor's own, {count} zones that have both");
-        table.push(name, metres(median(beside)));
+        table.push(name, metres(median(beside.into_iter())));
     }
     for why in NoReturn::ALL {
         let count = zones
@@ -263,21 +268,13 @@ fn table(args: &RangeArgs, zones: &[Zone]) -> Table {
     table
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
 fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
-    let shown = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6}"));
     OutputFile::write_with(path, |out| {
         write!(
             out,
             "capture,zone,depth_m,bound_m,spread_m,photons,confidence,no_depth,sensor_m"
         )?;
-        for n in 2..=RETURNS {
-            write!(out, ",depth_{n}_m,bound_{n}_m,photons_{n}")?;
-        }
+        write_further_head(out)?;
         writeln!(out)?;
         for zone in zones {
             let first = zone.returns.first();
@@ -294,16 +291,11 @@ fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
                 zone.no_depth.map_or(String::new(), |why| why.to_string()),
                 shown(zone.sensor_m),
             )?;
-            for n in 1..RETURNS {
-                let further = zone.returns.get(n);
-                write!(
-                    out,
-                    ",{},{},{}",
-                    shown(further.map(|of| of.depth_m)),
-                    shown(further.and_then(|of| of.bound_m)),
-                    shown(further.map(|of| of.photons)),
-                )?;
-            }
+            let returns = &zone.returns;
+            write_further(out, |n| {
+                let further = returns.get(n)?;
+                Some((further.depth_m, further.bound_m, further.photons))
+            })?;
             writeln!(out)?;
         }
         Ok(())

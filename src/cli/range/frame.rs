@@ -5,13 +5,14 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::RangeArgs;
+use super::returns::{shown, write_further, write_further_head};
 use crate::cli::quality;
 use crate::cli::voice::{say_json, tell};
 use crate::files::{InputError, OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate, read_calibration};
-use crate::system::{PixelDepth, RETURNS, Ranged, Summary, TakenFrame, check_counts};
+use crate::system::{PixelDepth, Ranged, Summary, TakenFrame, check_counts};
 
 /// What is printed with `--json`.
 #[derive(Serialize)]
@@ -67,27 +68,14 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     Ok(tell(table)?)
 }
 
-/// Columns of the returns after the first.
-const FURTHER: [&str; 3 * (RETURNS - 1)] = [
-    "depth_2_m",
-    "bound_2_m",
-    "photons_2",
-    "depth_3_m",
-    "bound_3_m",
-    "photons_3",
-    "depth_4_m",
-    "bound_4_m",
-    "photons_4",
-];
-
 fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
-    let shown = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6}"));
     OutputFile::write_with(path, |out| {
-        writeln!(
+        write!(
             out,
-            "row,col,start,true_m,guide_m,depth_m,bound_m,spread_m,photons,confidence,no_depth,{}",
-            FURTHER.join(",")
+            "row,col,start,true_m,guide_m,depth_m,bound_m,spread_m,photons,confidence,no_depth"
         )?;
+        write_further_head(out)?;
+        writeln!(out)?;
         for (at, pixel) in ranged.pixels.iter().enumerate() {
             write!(
                 out,
@@ -104,16 +92,10 @@ fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
                 shown(pixel.confidence),
                 pixel.no_depth.map_or("", |why| why.name()),
             )?;
-            for n in 1..RETURNS {
-                let further = pixel.returns.get(n);
-                write!(
-                    out,
-                    ",{},{},{}",
-                    shown(further.map(|further| further.depth_m)),
-                    shown(further.and_then(|further| further.bound_m)),
-                    shown(further.map(|further| further.photons)),
-                )?;
-            }
+            write_further(out, |n| {
+                let further = pixel.returns.get(n)?;
+                Some((further.depth_m, further.bound_m, further.photons))
+            })?;
             writeln!(out)?;
         }
         Ok(())

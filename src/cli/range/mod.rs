@@ -3,6 +3,7 @@
 mod args;
 mod counts;
 mod frame;
+mod returns;
 mod tmf8820;
 
 pub(super) use self::args::RangeArgs;

@@ -6,11 +6,13 @@
 use serde::Serialize;
 
 use super::args::{Fit, RangeArgs};
+use super::returns::shown;
 use crate::cli::voice::{say_json, tell};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
 use crate::report::Grid;
+use crate::system::median;
 
 /// Fewest counts above background that are taken for a pulse.
 const LEAST_SIGNAL: f64 = 100.0;
@@ -261,7 +263,6 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
             writeln!(out, "capture,zone,true_m,depth_m,sensor_m")?;
             for s in &reported {
                 let (capture, zone) = (captures[s.capture].capture, s.echo.zone);
-                let shown = |m: Option<f64>| m.map_or(String::new(), |m| format!("{m:.6}"));
                 let (true_m, depth_m) = (shown(s.true_m), depth(s));
                 let sensor_m = shown(s.sensor_m);
                 writeln!(out, "{capture},{zone},{true_m},{depth_m:.6},{sensor_m}")?;
@@ -277,7 +278,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         left_out,
         reported: reported.len(),
         fit: args.calibration.is_none().then_some(fit),
-        median_m: median(reported.iter().map(|s| depth(s)).collect()),
+        median_m: median(reported.iter().map(|s| depth(s))).unwrap_or(f64::NAN),
         depths: Errors::of(reported.iter().filter_map(|s| Some(depth(s) - s.true_m?))),
         sensor: Errors::of(
             reported
@@ -292,12 +293,6 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     }
     tell(table(&report))?;
     Ok(())
-}
-
-/// Of at least one number.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 fn table(report: &Report) -> String {

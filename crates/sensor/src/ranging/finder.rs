@@ -155,7 +155,7 @@ impl EchoFinder {
         })
     }
 
-    /// For counts that SPADs of this response have in so many laser cycles, with bins of `bin_s` seconds each.
+    /// For counts of a detector with this response in `laser_cycles`, with bins of `bin_s` seconds each.
     pub(super) fn of_response(
         response: Response,
         bin_s: f64,

@@ -49,7 +49,7 @@ pub struct Histograms {
 pub struct ZoneCounts {
     /// Counts, zone by zone.
     pub counts: Vec<u32>,
-    /// Counts of the light that goes straight from the laser to a SPAD.
+    /// Counts of the light that goes straight from the laser to a SPAD; its bins may be others than those of zones.
     pub reference: Option<Vec<u32>>,
     /// What the sensor itself made of each zone, m, where it saw something. Empty if the file does not say.
     pub own_depths_m: Vec<Option<f64>>,

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Fields that are not named here are passed over. References are added up. They tell when the laser pulse left only if they have as many
-//! bins as the zones, which they have where zones have 64. Without them `Result_Set` is of the sensor's own depths alone.
+//! bins as the zones, which they have where zones have 64. Without `mp_histo` a frame has the sensor's own depths alone.
 
 use std::io::Read;
 use std::path::Path;
@@ -87,7 +87,7 @@ pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
         let own_depths: Vec<Option<f64>> = frame.depths.iter().flatten().map(nearest_m).collect();
         captures.push(ZoneCounts {
             counts: histograms.iter().flat_map(|h| &h.bins).copied().collect(),
-            reference: sum(&frame.references, bins),
+            reference: sum(&frame.references),
             own_depths_m: if own_depths.len() == zones {
                 own_depths
             } else {
@@ -108,8 +108,9 @@ fn nearest_m(zone: &ZoneResult) -> Option<f64> {
     (distance_mm > 0.0).then_some(1e-3 * distance_mm)
 }
 
-fn sum(references: &[Histogram], bins: usize) -> Option<Vec<u32>> {
-    let is_usable = !references.is_empty() && references.iter().all(|r| r.bins.len() == bins);
+fn sum(references: &[Histogram]) -> Option<Vec<u32>> {
+    let bins = references.first()?.bins.len();
+    let is_usable = references.iter().all(|r| r.bins.len() == bins);
     is_usable.then(|| {
         let sum = |bin: usize| {
             references

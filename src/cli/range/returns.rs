@@ -1,0 +1,36 @@
+//! Columns of tables of depths: numbers that may be missing, and the returns after the first.
+
+use std::io::{self, Write};
+
+use crate::system::RETURNS;
+
+/// A number, or nothing.
+pub(super) fn shown(value: Option<f64>) -> String {
+    value.map_or(String::new(), |value| format!("{value:.6}"))
+}
+
+/// Names of the columns of the returns after the first.
+pub(super) fn write_further_head(out: &mut dyn Write) -> io::Result<()> {
+    for n in 2..=RETURNS {
+        write!(out, ",depth_{n}_m,bound_{n}_m,photons_{n}")?;
+    }
+    Ok(())
+}
+
+/// Depth (m), bound (m) and photons of the returns after the first, which `further` gives by their numbers from 1.
+pub(super) fn write_further(
+    out: &mut dyn Write,
+    further: impl Fn(usize) -> Option<(f64, Option<f64>, f64)>,
+) -> io::Result<()> {
+    for n in 1..RETURNS {
+        let further = further(n);
+        write!(
+            out,
+            ",{},{},{}",
+            shown(further.map(|(depth_m, ..)| depth_m)),
+            shown(further.and_then(|(_, bound_m, _)| bound_m)),
+            shown(further.map(|(.., photons)| photons)),
+        )?;
+    }
+    Ok(())
+}
