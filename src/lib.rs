@@ -33,6 +33,7 @@
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`theory`] | detection probability, precision, partial histograms, design, significance |
 //! | [`ranging`] | depth from histograms |
+//! | `strategies` | random chips and photons for property tests, with the feature `proptest` |
 //! | [`report`] | pictures, arrays, tables |
 //! | [`photons`] | SPAD pulses of a scene for any chip, as files |
 //! | [`system`] | one guided frame, end to end, and drives of many |
@@ -60,6 +61,8 @@ pub mod testbenches;
 pub use guided_dtof_light::{
     files, guide, numerics, photon, scene, settings, stereo, theory, units,
 };
+#[cfg(feature = "proptest")]
+pub use guided_dtof_sensor::strategies;
 pub use guided_dtof_sensor::{
     ORIGIN, analysis, chip, engine, kernel, liberty, logic, netlist, ranging, sdf, stimulus,
     verilog, waves,

@@ -15,12 +15,12 @@ use rand::{SeedableRng, rngs::StdRng};
 use crate::every_edge::waves::Waves;
 use crate::icarus;
 use crate::saif::{compare, read_saif, saif};
-use crate::scenario::Scenario;
+use crate::scenario::{self, Scenario};
 
 #[test]
 fn in_an_exposed_sensor() {
     for seed in 0..3 {
-        let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 2);
+        let scenario = scenario::random(&mut StdRng::seed_from_u64(seed), 1, 2);
         let Scenario {
             config,
             exposure,

@@ -76,7 +76,7 @@ fn random_macropixels() {
     let mut seeds = 0..10_000;
     while !wanted.is_empty() {
         let seed = seeds.next().expect("every P-counter is drawn now and then");
-        let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
+        let scenario = scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
         let config = &scenario.config;
         let p_counter = (config.p_counter, config.tap, config.after_borrow);
         if let Some(index) = wanted.iter().position(|&wanted| wanted == p_counter) {
@@ -118,7 +118,7 @@ fn sensors_of_another_kind() {
                 config.clk_skew_ps = random.random_range(0.0..=200.0);
                 silicon = scenario::silicon(random, &config);
             }
-            let scenario = Scenario::of(random, config);
+            let scenario = scenario::of_sensor(random, config);
             all = all + compare_silicon(&scenario, &silicon);
         }
     }
@@ -143,7 +143,7 @@ fn macropixels_whose_spads_share_a_wire() {
             dead_time_ns: 2.0,
             ..SensorConfig::default()
         };
-        all = all + compare_sensor(&Scenario::of(random, config));
+        all = all + compare_sensor(&scenario::of_sensor(random, config));
     }
     all.print(
         "macropixels whose SPADs share a wire",

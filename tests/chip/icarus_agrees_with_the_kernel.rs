@@ -11,7 +11,7 @@ use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
 
 fn compare(random: &mut StdRng, rows: usize, cols: usize) {
-    let scenario = Scenario::random(random, rows, cols);
+    let scenario = scenario::random(random, rows, cols);
     let pulses = scenario.pulses();
     let Scenario {
         config,

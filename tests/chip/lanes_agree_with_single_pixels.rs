@@ -5,7 +5,7 @@ use guided_dtof::engine::{Gate, GateSimulation, LaneSimulation, PulsedPixel};
 use guided_dtof::netlist::{Mismatch, Timing, varied};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
-use crate::scenario::Scenario;
+use crate::scenario::{self, Scenario};
 use crate::traces::{LaneTraces, Trace};
 
 #[test]
@@ -13,7 +13,7 @@ fn change_by_change() {
     for seed in 0..12 {
         let random = &mut StdRng::seed_from_u64(seed);
         let lanes = random.random_range(1..=64);
-        let scenario = Scenario::random(random, 1, lanes);
+        let scenario = scenario::random(random, 1, lanes);
         let pulses = scenario.pulses();
         let Scenario {
             config,
@@ -63,7 +63,7 @@ fn where_macropixels_have_delays_of_their_own() {
     for seed in 0..4 {
         let random = &mut StdRng::seed_from_u64(seed);
         let pixels = random.random_range(2..40);
-        let scenario = Scenario::random(random, 1, pixels);
+        let scenario = scenario::random(random, 1, pixels);
         let (config, exposure) = (&scenario.config, &scenario.exposure);
         let (starts, pulses) = (&scenario.starts, scenario.pulses());
         let gate = Gate::new(config, exposure);

@@ -208,7 +208,7 @@ proptest! {
 
 /// A sensor of this many macropixels after anything that may happen to it, with any number of pins.
 fn exposed(seed: u64, rows: usize, cols: usize) -> (Scenario, GateSimulation) {
-    let mut scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), rows, cols);
+    let mut scenario = scenario::random(&mut StdRng::seed_from_u64(seed), rows, cols);
     scenario.config.readout_pins = 1 + seed as usize % 3;
     let Scenario {
         config,

@@ -73,7 +73,7 @@ fn compare(scenario: &Scenario) -> Seen {
 fn macropixels_annotated_in_icarus_agree_with_our_kernel() {
     if icarus::is_here() {
         let random =
-            |seed, rows, cols| Scenario::random(&mut StdRng::seed_from_u64(seed), rows, cols);
+            |seed, rows, cols| scenario::random(&mut StdRng::seed_from_u64(seed), rows, cols);
         for seed in 0..cases::cases(6).into() {
             compare(&random(seed, 1, 1));
         }
@@ -96,7 +96,7 @@ fn delay_lines_pass_pulses_shorter_than_their_elements() {
             corner,
             ..(*hslidar_delay_line()).clone()
         };
-        let mut scenario = Scenario::of(&mut StdRng::seed_from_u64(seed), config);
+        let mut scenario = scenario::of_sensor(&mut StdRng::seed_from_u64(seed), config);
         for pulses in &mut scenario.pulses {
             let mut last = Time::ZERO;
             pulses.retain(|pulse| {

@@ -6,14 +6,14 @@ use guided_dtof::kernel::TraceHash;
 use rand::{SeedableRng, rngs::StdRng};
 use rayon::prelude::*;
 
-use crate::scenario::Scenario;
+use crate::scenario;
 
 const MACROPIXELS: u64 = 8;
 
 /// Number of changes and hash of one random macropixel, with instants handled in a random order where there is a
 /// seed for it.
 fn macropixel(seed: u64, shuffle: Option<u64>) -> (u64, u64) {
-    let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
+    let scenario = scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
     let (config, exposure) = (&scenario.config, &scenario.exposure);
     let pulses = scenario.pulses();
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &scenario.starts, &pulses);
@@ -42,7 +42,7 @@ fn macropixels_do_not_depend_on_the_order_within_an_instant() {
 
 #[test]
 fn the_number_of_threads_changes_nothing() {
-    let scenario = Scenario::random(&mut StdRng::seed_from_u64(99), 4, 20);
+    let scenario = scenario::random(&mut StdRng::seed_from_u64(99), 4, 20);
     let gate = Gate::new(&scenario.config, &scenario.exposure);
     let pulses = scenario.pulses();
     let run = |threads: usize| {

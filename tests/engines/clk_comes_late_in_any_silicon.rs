@@ -19,7 +19,7 @@ use rand::{RngExt, SeedableRng, rngs::StdRng};
 fn any(random: &mut StdRng) -> (Scenario, Silicon) {
     let (rows, cols) = (random.random_range(1..3), random.random_range(2..5));
     let mut config = match random.random_range(0..3) {
-        0 => Scenario::random(random, rows, cols).config,
+        0 => scenario::random(random, rows, cols).config,
         1 => (*hslidar()).clone(),
         _ => (*hslidar_delay_line()).clone(),
     };
@@ -37,7 +37,7 @@ fn any(random: &mut StdRng) -> (Scenario, Silicon) {
         ..config
     };
     let silicon = scenario::silicon(random, &config);
-    (Scenario::of(random, config), silicon)
+    (scenario::of_sensor(random, config), silicon)
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn compare(first_seed: u64, cases: u32, most: usize, expected: impl Fn(&Scenario
     for seed in first_seed..first_seed + u64::from(cases) {
         let random = &mut StdRng::seed_from_u64(seed);
         let lanes = random.random_range(1..=most);
-        let mut scenario = Scenario::random(random, 1, lanes);
+        let mut scenario = scenario::random(random, 1, lanes);
         leave_out_races(&mut scenario);
         let Scenario {
             config,
@@ -115,7 +115,7 @@ fn as_the_gates_of_hslidar_count() {
             let exposure = Exposure::new(&config, 140, 12);
             let mut scenario = Scenario {
                 starts: (0..128).collect(),
-                ..Scenario::exposed(random, config, exposure)
+                ..scenario::in_exposure(random, config, exposure)
             };
             leave_out_races(&mut scenario);
             let Scenario { config, starts, .. } = &scenario;

@@ -12,7 +12,7 @@ use proptest::prelude::*;
 use rand::{SeedableRng, rngs::StdRng};
 
 use crate::cases::cases;
-use crate::scenario::Scenario;
+use crate::scenario;
 
 /// What all nets are at a time, and their changes from then on.
 #[derive(PartialEq)]
@@ -99,7 +99,7 @@ proptest! {
         clk_skew_ps in 0f64..=200.0,
     ) {
         let mut random = StdRng::seed_from_u64(seed);
-        let mut config = Scenario::random(&mut random, 1, 1).config;
+        let mut config = scenario::random(&mut random, 1, 1).config;
         config.bin_bits = config.bin_bits.min(4);
         (config.cols, config.clk_skew_ps) = (cols, clk_skew_ps);
         if conventional {
@@ -109,7 +109,7 @@ proptest! {
         let round = 1 << (config.counter_bits + 1);
         let stop_periods = if memoryless && round < 200 { round } else { 40 };
         let exposure = Exposure::new(&config, stop_periods, cycles);
-        let scenario = Scenario::exposed(&mut random, config, exposure);
+        let scenario = scenario::in_exposure(&mut random, config, exposure);
         let (start, pulses) = (scenario.starts[0], &scenario.pulses[0]);
         for cycle in [cycles - 1, cycles / 2] {
             same(&scenario.config, &exposure, start, pulses, cycle);

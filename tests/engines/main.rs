@@ -4,8 +4,6 @@
 mod cases;
 #[path = "../shared/counters.rs"]
 mod counters;
-#[path = "../shared/random_library.rs"]
-mod random_library;
 #[path = "../shared/scenario.rs"]
 mod scenario;
 #[path = "../shared/wide8x8.rs"]
@@ -30,6 +28,7 @@ mod light_is_a_list;
 mod own_blocks_agree_with_built_in_ones;
 mod own_counters_remember_nothing;
 mod photons_drawn_are_those_of_the_exposure;
+mod properties_hold;
 mod random_libraries_count_alike;
 mod spads_have_a_timing_of_their_own;
 mod timed_agrees_with_gate;

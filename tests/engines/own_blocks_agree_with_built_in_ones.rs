@@ -58,7 +58,7 @@ fn every_built_in_counter_read_back_counts_the_same_on_every_engine() {
     for seed in 0..cases(60).into() {
         let random = &mut StdRng::seed_from_u64(seed);
         let lanes = random.random_range(1..12);
-        let scenario = Scenario::random(random, 1, lanes);
+        let scenario = scenario::random(random, 1, lanes);
         let config = &scenario.config;
         let own = read_back(config);
         assert_eq!(ChipTiming::of(&own), ChipTiming::of(config), "{config:?}");
@@ -96,7 +96,7 @@ fn a_counter_that_is_not_binary_gets_its_codes_and_the_law_of_the_others() {
             ..config.clone()
         };
         let exposure = Exposure::new(&config, 520, 6);
-        let mut scenario = Scenario::exposed(random, config, exposure);
+        let mut scenario = scenario::in_exposure(random, config, exposure);
         scenario.starts[5] = 511;
         let (windows, counted) = counted(&scenario.config, &scenario);
         let opens = |start: u16| {
@@ -140,7 +140,7 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
     assert_eq!(law.uneven(), Some(Uneven::Same(0, 1)));
     assert!(!config.may_have_law());
     let exposure = Exposure::new(&config, 60, 5);
-    let scenario = Scenario::exposed(&mut StdRng::seed_from_u64(1), config, exposure);
+    let scenario = scenario::in_exposure(&mut StdRng::seed_from_u64(1), config, exposure);
     let (windows, counted) = counted(&scenario.config, &scenario);
     let same = Window::Irregular(Irregular::OwnCounter(Uneven::Same(0, 1)));
     assert_eq!(windows, vec![same; 8]);
@@ -205,7 +205,7 @@ fn other_blocks_read_back_count_the_same_on_gates_and_cycles_and_have_no_law() {
     let mut ran = [0; LAWLESS.len() + 1];
     for seed in 0..cases(40).into() {
         let random = &mut StdRng::seed_from_u64(seed);
-        let mut scenario = Scenario::random(random, 1, 6);
+        let mut scenario = scenario::random(random, 1, 6);
         // A library's toggle flip-flops are slower than they are read back as.
         scenario.config.liberty = PathBuf::new();
         scenario.config.liberty_slow = PathBuf::new();
@@ -257,7 +257,7 @@ fn other_blocks_that_differ_show_it_on_gates_and_cycles() {
     };
     let [_, of_front_end, of_metdc, of_histogram] = LAWLESS;
     let exposure = Exposure::new(&config, 60, 12);
-    let mut scenario = Scenario::exposed(&mut StdRng::seed_from_u64(3), config, exposure);
+    let mut scenario = scenario::in_exposure(&mut StdRng::seed_from_u64(3), config, exposure);
     scenario.starts.fill(20);
     let config = &scenario.config;
     let built_in = counted(config, &scenario).1[0].clone().unwrap();

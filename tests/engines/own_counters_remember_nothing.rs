@@ -2,7 +2,7 @@
 
 use crate::cases::cases;
 use crate::counters::{self, Drawn, Hidden, Kind};
-use crate::scenario::Scenario;
+use crate::scenario;
 
 use std::collections::HashSet;
 
@@ -21,9 +21,9 @@ fn count_alike(config: SensorConfig, random: &mut StdRng) -> (bool, bool) {
     let wraps = config.after_borrow == AfterBorrow::Wrap;
     let scenario = if wraps && config.p_counter.row().has_memory && random.random_bool(0.75) {
         let exposure = Exposure::new(&config, u32::from(config.largest_start()), 6);
-        Scenario::exposed(random, config, exposure)
+        scenario::in_exposure(random, config, exposure)
     } else {
-        Scenario::of(random, config)
+        scenario::of_sensor(random, config)
     };
     let (config, exposure) = (&scenario.config, &scenario.exposure);
     let (starts, pulses) = (&scenario.starts, scenario.pulses());

@@ -7,8 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::cases::cases;
-use crate::random_library::random_library;
-use crate::scenario::{Scenario, p_counters};
+use crate::scenario::{self, Scenario, p_counters};
 use guided_dtof::chip::race::{Conflict, Race};
 use guided_dtof::chip::window_law::WindowLaw;
 use guided_dtof::chip::{Exposure, Mode, Probe, Sensor, SensorConfig, Tdc};
@@ -18,6 +17,7 @@ use guided_dtof::engine::{
 use guided_dtof::kernel::Recorder;
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
+use guided_dtof_sensor::strategies::library_of;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 /// Chips made of one library.
@@ -60,7 +60,7 @@ fn as_the_gates_count() {
         let file = folder.path().join(format!("{library}.lib"));
         if !file.exists() {
             let random = &mut StdRng::seed_from_u64(1_000_000 + u64::from(library));
-            std::fs::write(&file, random_library(random)).unwrap();
+            std::fs::write(&file, library_of(|| random.random_range(0.0..1.0))).unwrap();
         }
         compare(seed, &file, &mut tally);
     }
@@ -200,7 +200,7 @@ fn compare(seed: u32, file: &Path, tally: &mut Tally) {
         tally.unbuildable += 1;
         return;
     }
-    let mut scenario = Scenario::of(random, config);
+    let mut scenario = scenario::of_sensor(random, config);
     let law = WindowLaw::new(&scenario.config, &scenario.exposure);
     add_photons_at_edges(&mut scenario, &law);
     let Scenario {

@@ -61,7 +61,7 @@ fn silicon(random: &mut StdRng, config: &SensorConfig) -> Silicon {
 
 fn scenario(random: &mut StdRng, clock: Clock) -> (Scenario, Silicon) {
     let (rows, cols) = (random.random_range(1..3), random.random_range(1..5));
-    let Scenario { mut config, .. } = Scenario::random(random, rows, cols);
+    let Scenario { mut config, .. } = scenario::random(random, rows, cols);
     let silicon = silicon(random, &config);
     if clock != Clock::Any {
         if clock == Clock::NearLimit {
@@ -94,7 +94,7 @@ fn scenario(random: &mut StdRng, clock: Clock) -> (Scenario, Silicon) {
         }
         config.check().expect("a sensor");
     }
-    (Scenario::of(random, config), silicon)
+    (scenario::of_sensor(random, config), silicon)
 }
 
 fn compare(seed: u64, scenario: &Scenario, silicon: &Silicon) -> Tally {
@@ -204,7 +204,7 @@ fn at_the_limit_the_gates_are_asked() {
         let timing = ChipTiming::of(&config);
         let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;
         config.clk_hz = 1e15 / (2 * strobe.as_fs() + 2 * off_fs) as f64;
-        let mut scenario = Scenario::of(random, config);
+        let mut scenario = scenario::of_sensor(random, config);
         scenario.starts = vec![5, 8, 12, 15];
         let tally = compare(0, &scenario, &Silicon::nominal(Corner::Typ));
         assert_eq!(tally.kept, if is_replayed { 0 } else { 4 }, "{off_fs}");

@@ -9,12 +9,15 @@
 //! | [`analysis`] | the periods, corners and spread that static timing allows |
 //! | [`waves`] | waveforms as files, with views beside them |
 //! | [`ranging`] | depth from histograms |
+//! | `strategies` | random chips and photons for property tests, with the feature `proptest` |
 
 pub mod analysis;
 pub mod chip;
 pub mod engine;
 pub mod ranging;
 pub mod stimulus;
+#[cfg(feature = "proptest")]
+pub mod strategies;
 pub mod waves;
 
 pub use femtogate::{Origin, kernel, liberty, logic, netlist, sdf, verilog};

@@ -159,7 +159,7 @@ pub struct NeverMet {
 
 impl NeverMet {
     /// The thresholds of this type that a number from 0 to `lines` meets.
-    fn possible(event_type: EventType, lines: usize) -> RangeInclusive<usize> {
+    pub(crate) fn possible(event_type: EventType, lines: usize) -> RangeInclusive<usize> {
         match event_type {
             EventType::Less => 1..=(1 << count_bits(lines)) - 1,
             EventType::Equal => 0..=lines,

@@ -1,30 +1,50 @@
 //! Random cell libraries as Liberty files: rise ≠ fall, Q ≠ QN, random limits, and now and then without the cells that a kit may lack.
+//!
+//! ```text
+//!   numbers from 0 to 1 ──► library_of ──► text ──► FILE.lib ──► liberty = "FILE.lib" of a sensor
+//!      0.5 is the middle of every delay and limit, and every cell
+//! ```
+//!
+//! Delays are tables of slew and load that are planes, so that interpolation adds nothing of its own. The middles are those of an invented
+//! 40 nm library, up to three times more or less; a whole library is 0.6 to 10 times as slow.
 
 use std::fmt::Write;
 
-use rand::{RngExt, rngs::StdRng};
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 /// Slews (ns) and loads (pF) of every table, which is a plane through them.
 const SLEWS: [f64; 2] = [0.005, 0.3];
 const LOADS: [f64; 2] = [0.0005, 0.04];
 
-struct Maker<'r> {
-    random: &'r mut StdRng,
-    text: String,
-    /// On every delay and limit.
-    slower: f64,
+/// Numbers that a library with all cells takes.
+const NUMBERS: usize = 157;
+
+/// Text of Liberty files. It shrinks towards a library of all cells with the middles of their delays and limits.
+pub fn libraries() -> impl Strategy<Value = String> + Clone {
+    vec(-50i8..=50, NUMBERS).prop_map(|steps| {
+        let mut steps = steps.into_iter();
+        library_of(|| 0.5 + f64::from(steps.next().unwrap_or(0)) / 101.0)
+    })
 }
 
-/// The text of a library that no other seed gives.
-pub fn random_library(random: &mut StdRng) -> String {
-    let slower = 10f64.powf(random.random_range(-0.2..1.0));
+/// The text of the library that `next` decides, which gives numbers from 0 to 1.
+pub fn library_of(mut next: impl FnMut() -> f64) -> String {
+    let slower = libm::pow(10.0, -0.2 + 1.2 * next());
     let mut maker = Maker {
-        random,
+        next: &mut next,
         text: HEAD.to_owned(),
         slower,
     };
     maker.cells();
     maker.text + "}\n"
+}
+
+struct Maker<'n> {
+    next: &'n mut dyn FnMut() -> f64,
+    text: String,
+    /// On every delay and limit.
+    slower: f64,
 }
 
 const HEAD: &str = "library (random) {
@@ -45,11 +65,11 @@ const HEAD: &str = "library (random) {
 impl Maker<'_> {
     /// `middle`, or up to three times more or less.
     fn about(&mut self, middle: f64) -> f64 {
-        middle * 3f64.powf(self.random.random_range(-1.0..1.0))
+        middle * libm::pow(3.0, 2.0 * (self.next)() - 1.0)
     }
 
     fn has(&mut self, probability: f64) -> bool {
-        self.random.random_bool(probability)
+        (self.next)() < probability
     }
 
     fn cells(&mut self) {
@@ -208,5 +228,45 @@ impl Maker<'_> {
             self.text += "    }\n";
         }
         self.text += "  }\n";
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::{Sensor, SensorConfig};
+    use crate::strategies::drawn;
+
+    #[test]
+    fn the_simplest_library_has_all_cells() {
+        let mut numbers = 0;
+        let text = library_of(|| {
+            numbers += 1;
+            0.5
+        });
+        assert_eq!(numbers, NUMBERS);
+        for cell in [
+            "INV", "BUF", "AND2", "OR2", "XOR2", "XNOR2", "MUX2", "DFFR", "DFFSR",
+        ] {
+            assert!(text.contains(&format!("cell ({cell})")), "{cell}");
+        }
+    }
+
+    #[test]
+    fn chips_are_made_of_any_library() {
+        let folder = tempfile::tempdir().unwrap();
+        let ripples = (0..6).map(|seed| {
+            let liberty = folder.path().join(format!("{seed}.lib"));
+            std::fs::write(&liberty, drawn(seed, &libraries())).unwrap();
+            let config = SensorConfig {
+                liberty,
+                clk_hz: 10e6,
+                dead_time_ns: 400.0,
+                ..SensorConfig::default()
+            };
+            Sensor::new(config).unwrap().timing().ripple()
+        });
+        let ripples: std::collections::BTreeSet<_> = ripples.collect();
+        assert_eq!(ripples.len(), 6);
     }
 }
