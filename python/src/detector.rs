@@ -1,7 +1,8 @@
 //! Histograms of any sensor.
 
+use guided_dtof::files::{parse_toml, read_text};
 use guided_dtof::ranging::{
-    Agreement, Counted, DepthOptions, DetectedReturn, Detector, NoReturn, SurfaceLight,
+    Agreement, DepthOptions, DetectedReturn, Detector, DetectorDescription, NoReturn, SurfaceLight,
 };
 use guided_dtof::request::{Spelling, check_false_alarm_rate};
 use guided_dtof::system::RETURNS;
@@ -14,20 +15,63 @@ use crate::arrays::map;
 use crate::background::run;
 use crate::failure::Failure;
 
-/// Bins, length of a bin (s), begin of the first (s), standard deviation of the pulse (s), and laser cycles if first photons count.
-type Spelled = (usize, f64, f64, f64, Option<u32>);
+/// Bins, and the detector's description as JSON.
+type Described = (usize, String);
 
-fn spelled((bins, bin_s, begins_s, pulse_sigma_s, laser_cycles): Spelled) -> Detector {
-    Detector {
-        bins,
-        bin_s,
-        begins_s,
-        pulse_sigma_s,
-        counted: match laser_cycles {
-            Some(laser_cycles) => Counted::FirstPhoton { laser_cycles },
-            None => Counted::EveryPhoton,
-        },
-    }
+fn detector((bins, description): Described) -> Result<Detector, Failure> {
+    let description: DetectorDescription = serde_json::from_str(&description)
+        .map_err(|error| Failure::argument("detector", error.to_string()))?;
+    let detector = description.detector(bins);
+    detector.map_err(|bad| {
+        let key = match bad.key {
+            "bin_width_ns" => "bin_ns",
+            key => key,
+        };
+        Failure::argument(key, bad.message)
+    })
+}
+
+/// Checks a description.
+#[pyfunction]
+pub(crate) fn detector_checked(described: Described) -> PyResult<()> {
+    detector(described)?;
+    Ok(())
+}
+
+/// The description in a file, as JSON.
+#[pyfunction]
+pub(crate) fn detector_file(path: std::path::PathBuf) -> PyResult<String> {
+    let text = read_text(&path).map_err(Failure::from)?;
+    let description: DetectorDescription =
+        parse_toml(path.display(), &text).map_err(Failure::from)?;
+    Ok(serde_json::to_string(&description).expect("numbers and words"))
+}
+
+/// Photons of a cover glass in each bin of all zones, from the sums of so many histograms; see `gdtof.Detector.crosstalk`.
+#[pyfunction]
+pub(crate) fn detector_crosstalk<'py>(
+    py: Python<'py>,
+    described: Described,
+    sums: PyReadonlyArray2<'py, u32>,
+    histograms: u32,
+    is_fit: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let detector = detector(described)?;
+    let bins = detector.bins();
+    let zones: Vec<Vec<u32>> = (sums.as_array().rows().into_iter())
+        .map(|zone| zone.to_vec())
+        .collect();
+    let light = |zone: &Vec<u32>| {
+        let mut light = if is_fit {
+            detector.fitted_crosstalk(zone, histograms)
+        } else {
+            detector.measured_crosstalk(zone, histograms)
+        };
+        light.resize(bins, 0.0);
+        light
+    };
+    let light: Vec<f64> = zones.par_iter().flat_map_iter(light).collect();
+    Ok(map(py, (zones.len(), bins), light).into_any())
 }
 
 /// The counts of each zone, checked.
@@ -49,8 +93,9 @@ fn zones(
 #[pyfunction]
 pub(crate) fn detector_range<'py>(
     py: Python<'py>,
-    detector: Spelled,
+    described: Described,
     counts: PyReadonlyArray2<'py, u32>,
+    crosstalk: Option<PyReadonlyArray2<'py, f64>>,
     false_alarm_rate: f64,
     correct_walk: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -60,12 +105,24 @@ pub(crate) fn detector_range<'py>(
         correct_walk,
         ..DepthOptions::default()
     };
-    let detector = spelled(detector);
+    let detector = detector(described)?;
     let zones = zones(&detector, &counts)?;
+    let crosstalk: Vec<Vec<f64>> = match &crosstalk {
+        Some(light) => {
+            let light = light.as_array();
+            light.rows().into_iter().map(|zone| zone.to_vec()).collect()
+        }
+        None => Vec::new(),
+    };
     let found = run(py, None, move |_| {
-        let found = zones
-            .par_iter()
-            .map(|zone| detector.returns(zone, &options));
+        let found = zones.par_iter().enumerate().map(|(number, zone)| {
+            let crosstalk = crosstalk.get(number).cloned().unwrap_or_default();
+            let detector = Detector {
+                crosstalk,
+                ..detector.clone()
+            };
+            detector.returns(zone, &options)
+        });
         Ok(found.collect::<Vec<_>>())
     })?;
     let dict = PyDict::new(py);
@@ -96,26 +153,26 @@ pub(crate) fn detector_range<'py>(
 #[pyfunction]
 pub(crate) fn detector_expected(
     py: Python<'_>,
-    detector: Spelled,
+    described: Described,
     light: (f64, f64, f64),
-) -> Bound<'_, PyArray1<f64>> {
+) -> PyResult<Bound<'_, PyArray1<f64>>> {
     let (depth_m, photons, background) = light;
     let light = SurfaceLight {
         depth_m,
         photons,
         background,
     };
-    spelled(detector).expected(&light).into_pyarray(py)
+    Ok(detector(described)?.expected(&light).into_pyarray(py))
 }
 
 /// How well counts agree, zone by zone: χ², cells and chance; see `gdtof.Detector.check`.
 #[pyfunction]
 pub(crate) fn detector_agreement(
-    detector: Spelled,
+    described: Described,
     counts: PyReadonlyArray2<'_, u32>,
     expected: PyReadonlyArray2<'_, f64>,
 ) -> PyResult<Vec<(f64, usize, f64)>> {
-    let detector = spelled(detector);
+    let detector = detector(described)?;
     if counts.shape() != expected.shape() {
         let message = format!(
             "is an array of shape {:?}; give one of {:?}, as counts have",

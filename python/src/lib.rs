@@ -54,7 +54,10 @@ mod _gdtof {
     #[pymodule_export]
     use super::counts::range_counts;
     #[pymodule_export]
-    use super::detector::{detector_agreement, detector_expected, detector_range};
+    use super::detector::{
+        detector_agreement, detector_checked, detector_crosstalk, detector_expected, detector_file,
+        detector_range,
+    };
     #[pymodule_export]
     use super::frame::frame;
     #[pymodule_export]

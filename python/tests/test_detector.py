@@ -1,5 +1,7 @@
 """Histograms of any sensor."""
 
+from pathlib import Path
+
 import gdtof
 import numpy as np
 import pytest
@@ -19,9 +21,9 @@ def drawn(detector: gdtof.Detector, depths: np.ndarray, photons: float, backgrou
             centre = 2 * depth / 0.299792458
             echo = random.normal(centre, detector.pulse_fwhm_ns / 2.354820045, random.poisson(photons / cycles))
             span = detector.bins * detector.bin_ns
-            light = random.uniform(0, span, random.poisson(background / cycles)) + detector.start_ns
+            light = random.uniform(0, span, random.poisson(background / cycles)) + (detector.start_ns or 0.0)
             times = np.concatenate([echo, light])
-            bins = np.floor((times - detector.start_ns) / detector.bin_ns).astype(int)
+            bins = np.floor((times - (detector.start_ns or 0.0)) / detector.bin_ns).astype(int)
             bins = bins[(bins >= 0) & (bins < detector.bins)]
             if detector.first_of is not None:
                 bins = np.sort(bins)[:1]
@@ -72,3 +74,43 @@ def test_what_cannot_be_is_said() -> None:
     assert detector.range(np.zeros(48, dtype=int)).reason == "no significant peak"
     with pytest.raises(gdtof.InputError, match="shape"):
         detector.check(np.zeros((2, 48), dtype=int), np.zeros((3, 48)))
+
+
+def test_a_file_describes_a_detector_as_its_arguments_do(tmp_path: Path) -> None:
+    file = tmp_path / "detector.toml"
+    file.write_text(
+        "bin_edges_ns = [0, 1, 2, 3.5]\npulse_fwhm_ns = 1\ncounts = \"first\"\nlaser_cycles = 70\nmost_counts = 63\n"
+        "coincidence = { spads = 2, within_ns = 4, of = 16 }\n"
+    )
+    same = gdtof.Detector(
+        bins=3,
+        pulse_fwhm_ns=1.0,
+        bin_edges_ns=[0.0, 1.0, 2.0, 3.5],
+        first_of=70,
+        most_counts=63,
+        coincidence=gdtof.Coincidence(2, 4.0, 16),
+    )
+    assert gdtof.Detector.load(file, 3) == same
+    with pytest.raises(gdtof.InputError, match="coincidence.spads"):
+        gdtof.Detector(bins=3, bin_ns=1.0, pulse_fwhm_ns=1, laser_cycles=9, coincidence=gdtof.Coincidence(3, 4, 2))
+    with pytest.raises(gdtof.InputError, match="bin_edges_ns"):
+        gdtof.Detector(bins=3, pulse_fwhm_ns=1, bin_edges_ns=np.array([0, 1, 2]))
+
+
+def test_a_surface_in_the_flank_of_a_glass_is_ranged() -> None:
+    detector = gdtof.Detector(bins=48, bin_ns=0.8, pulse_fwhm_ns=1.5, start_ns=-4.0)
+    depths = np.array([0.35, 0.6, 2.0, 4.0])
+    glass = drawn(detector, np.zeros(4), 3000, 2500)
+    counts = drawn(detector, depths, 900, 0) + glass
+    alone = np.stack([drawn(detector, np.zeros(4), 3000, 2500) for _ in range(3)])
+    light = detector.crosstalk(alone)
+    found = detector.range(counts, crosstalk=light)
+    # Counts of the surface in the light of the glass: the glass as it was measured is off by its own noise.
+    assert (np.abs(found.depth - depths) < 5 * found.bound).all()
+    assert (np.abs(detector.range(counts).depth) < 0.1).all()
+    fitted = detector.range(counts[2:], crosstalk=detector.crosstalk(counts[None, 2:], fit=True))
+    assert (np.abs(fitted.depth - depths[2:]) < 5 * fitted.bound).all()
+    with pytest.raises(gdtof.InputError, match="captures"):
+        detector.crosstalk(counts)
+    with pytest.raises(gdtof.InputError, match="crosstalk"):
+        detector.range(counts, crosstalk=np.zeros(47))

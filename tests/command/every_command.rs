@@ -88,6 +88,7 @@ pub fn workplace() -> tempfile::TempDir {
     let vectors = Path::new(env!("CARGO_MANIFEST_DIR")).join("vectors");
     let copy = |from: &str, to: &str| std::fs::copy(vectors.join(from), here.join(to)).unwrap();
     copy("range/captures.json", "captures.json");
+    copy("range/counts.csv", "counts.csv");
     copy("liberty/example.lib", "example.lib");
     let write = |name: &str, text: &str| std::fs::write(here.join(name), text).unwrap();
     write("inits.csv", "row,col,init\n0,0,20\n0,1,30\n");

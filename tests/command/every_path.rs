@@ -40,7 +40,8 @@ pub fn role(command: &str, argument: &str) -> Role {
         (
             _,
             "sensor" | "scene" | "world" | "liberty" | "left" | "right" | "calib" | "truth"
-            | "calibration" | "inits" | "events" | "sdf" | "histograms" | "frame" | "study",
+            | "calibration" | "inits" | "events" | "sdf" | "histograms" | "frame" | "study"
+            | "detector" | "crosstalk",
         ) => Input(""),
         (
             _,
@@ -59,6 +60,10 @@ fn besides(command: &str, argument: &str) -> &'static str {
         ("replay", "checks_json") => "--engine gate --checks report",
         ("timing", "plot") => "--mismatch 0.05",
         ("range", "calibration") => "",
+        ("range", "detector") => "--format counts",
+        ("range", "crosstalk") => {
+            "--format counts --histograms counts.csv --bin-width-ns 1 --pulse-fwhm-ns 1"
+        }
         ("range", "frame") => "--format frame",
         ("export verilog", "sdf" | "inits" | "events") => {
             "--inits inits.csv --events events.csv --rows 1 --cols 2 --stop-periods 100 --laser-cycles 5"

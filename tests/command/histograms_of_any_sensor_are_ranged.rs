@@ -319,10 +319,6 @@ fn what_is_missing_or_impossible_is_said_in_a_sentence() {
         (format!("{counts} {bins} --bins 9"), "no range of bins"),
         (format!("{counts} {bins} --counts first"), "--laser-cycles"),
         (
-            format!("{counts} {bins} --laser-cycles 5"),
-            "--counts first",
-        ),
-        (
             format!("{counts} {bins} --counts first --laser-cycles 5"),
             "zone 0 has",
         ),

@@ -2,6 +2,7 @@
 
 #[path = "../shared/command.rs"]
 mod command;
+mod detectors_are_described_in_files;
 mod tools;
 #[path = "../shared/yosys.rs"]
 mod yosys;

@@ -1,6 +1,6 @@
 //! The properties of `examples/properties.rs` hold in a few cases each, and each wrong claim beside them fails in a case that is small.
 
-use guided_dtof_sensor::strategies::{PropertyFailure, check_property};
+use guided_dtof_sensor::strategies::{PropertyFailure, check_property_from};
 
 use crate::cases::cases;
 
@@ -14,7 +14,8 @@ use properties::{PROPERTIES, WRONG};
 fn the_five_properties_hold() {
     let folder = tempfile::tempdir().unwrap();
     for (name, property) in PROPERTIES {
-        let held = check_property(cases(30), &properties::cases(), property, folder.path());
+        let cases = cases(30);
+        let held = check_property_from(1, cases, &properties::cases(), property, folder.path());
         held.unwrap_or_else(|failure| panic!("{name}: {failure}"));
     }
 }
@@ -23,7 +24,17 @@ fn the_five_properties_hold() {
 fn each_wrong_claim_fails_in_a_small_case_with_a_waveform() {
     for (name, claim) in WRONG {
         let folder = tempfile::tempdir().unwrap();
-        let held = check_property(200, &properties::cases(), claim, folder.path());
+        for seed in 0..20 {
+            let held = check_property_from(seed, 200, &properties::cases(), claim, folder.path());
+            match held {
+                Err(PropertyFailure::Fails { scenario, .. }) => {
+                    let photons: usize = scenario.pulses.iter().map(Vec::len).sum();
+                    println!("{name} {seed}: {} {photons}", scenario.config.pixels());
+                }
+                other => println!("{name} {seed}: {other:?}"),
+            }
+        }
+        let held = check_property_from(1, 200, &properties::cases(), claim, folder.path());
         let failure = held.expect_err(name);
         let PropertyFailure::Fails { scenario, view, .. } = failure else {
             panic!("{name}: {failure}");

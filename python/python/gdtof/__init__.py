@@ -11,7 +11,7 @@ Distances are metres along the ray, NaN where there is none; arrays by macropixe
 
 from . import errors, theory, waves
 from ._arrays import Reason
-from ._detector import Agreement, Detected, Detector
+from ._detector import Agreement, Coincidence, Detected, Detector
 from ._frame import Drive, DriveFrame, Frame, Maps, drive, frame
 from ._gdtof import Guide, Problem, Scene, Sensor, __version__
 from ._histograms import Exposed, Ranged, Replayed, expose, range, replay
@@ -23,6 +23,7 @@ from .waves import Waveform, read_vcd
 
 __all__ = [
     "Agreement",
+    "Coincidence",
     "Detected",
     "Detector",
     "Drive",

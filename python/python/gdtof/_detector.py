@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike, fspath
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from . import _gdtof
 from ._arguments import whole
 from .errors import InputError
-
-_FWHM_PER_SIGMA = 2.354820045
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +51,20 @@ class Agreement(NamedTuple):
     """Chance that counts of the expected light deviate at least as much. Below 0.001 the counts are of other light, or counted wrong."""
 
 
+class Coincidence(NamedTuple):
+    """SPADs that fire together make an event. The output of a SPAD is high for a time after a photon."""
+
+    spads: int
+    """How many outputs must be high."""
+    within_ns: float
+    """How long an output is high, ns."""
+    of: int
+    """SPADs on which the light comes evenly."""
+
+
 @dataclass(frozen=True)
 class Detector:
-    """A sensor whose histograms are ranged: how long its bins are, and which photons they count.
+    """A sensor whose histograms are ranged: how long its bins are, and which events they count.
 
     >>> import gdtof
     >>> tof = gdtof.Detector(bins=64, bin_ns=1.0, pulse_fwhm_ns=2.0)
@@ -64,29 +76,70 @@ class Detector:
 
     bins: int
     """Bins of a histogram."""
-    bin_ns: float
+    bin_ns: float | None = None
     """Length of a bin, ns."""
-    pulse_fwhm_ns: float
+    pulse_fwhm_ns: float | None = None
     """Full width at half maximum of the laser pulse with all jitter, ns."""
-    start_ns: float = 0.0
-    """When bin 0 begins after the centre of the laser pulse has left, ns."""
+    start_ns: float | None = None
+    """When bin 0 begins after the centre of the laser pulse has left, ns; 0 if it is not given."""
     first_of: int | None = None
-    """Laser cycles of a histogram, if each counts its first photon only; None if bins count every photon."""
+    """Laser cycles of a histogram, if each counts its first event only; None if bins count every event."""
+    bin_edges_ns: Sequence[float] | None = None
+    """In place of ``bin_ns`` and ``start_ns``: where bins begin, and the last one ends, after the centre of the laser pulse has left."""
+    laser_cycles: int | None = None
+    """Laser cycles of a histogram where every event counts, which a coincidence needs."""
+    coincidence: Coincidence | None = None
+    """What an event is, if it is not a photon."""
+    most_counts: int | None = None
+    """Counts at which a bin stops."""
 
     def __post_init__(self) -> None:
-        for name, value, least, most in (
-            ("bins", self.bins, 2, 65536),
-            ("bin_ns", self.bin_ns, 1e-3, 1e6),
-            ("pulse_fwhm_ns", self.pulse_fwhm_ns, 0.0, 0.5 * self.bin_ns * self.bins),
-            ("start_ns", self.start_ns, -1e9, 1e9),
-            ("first_of", 1 if self.first_of is None else self.first_of, 1, 2**32 - 1),
-        ):
-            if not least <= value <= most:
-                raise InputError(f"{name}: {value} is impossible; give {least} to {most}")
+        if not 2 <= self.bins <= 65536:
+            raise InputError(f"bins: {self.bins} is impossible; give 2 to 65536")
+        if self.first_of is not None and self.laser_cycles is not None:
+            raise InputError("laser_cycles: says the same as first_of; leave one of them out")
+        _gdtof.detector_checked(self._described())
 
-    def _spelled(self) -> tuple[int, float, float, float, int | None]:
-        sigma_s = 1e-9 * self.pulse_fwhm_ns / _FWHM_PER_SIGMA
-        return self.bins, 1e-9 * self.bin_ns, 1e-9 * self.start_ns, sigma_s, self.first_of
+    @classmethod
+    def load(cls, path: str | PathLike[str], bins: int) -> Detector:
+        """The detector that a file describes, as ``gdtof range --detector`` reads it.
+
+        Parameters
+        ----------
+        path
+            TOML file.
+        bins
+            Bins of a histogram.
+        """
+        keys = json.loads(_gdtof.detector_file(fspath(path)))
+        together = keys["coincidence"]
+        is_first = keys["counts"] == "first"
+        return cls(
+            bins,
+            keys["bin_width_ns"],
+            keys["pulse_fwhm_ns"],
+            keys["start_ns"],
+            first_of=keys["laser_cycles"] if is_first else None,
+            bin_edges_ns=keys["bin_edges_ns"],
+            laser_cycles=None if is_first else keys["laser_cycles"],
+            coincidence=None if together is None else Coincidence(**together),
+            most_counts=keys["most_counts"],
+        )
+
+    def _described(self) -> tuple[int, str]:
+        together = self.coincidence
+        keys = {
+            "bin_width_ns": self.bin_ns,
+            "bin_edges_ns": None if self.bin_edges_ns is None else list(self.bin_edges_ns),
+            "start_ns": self.start_ns,
+            "pulse_fwhm_ns": self.pulse_fwhm_ns,
+            "counts": "every" if self.first_of is None else "first",
+            "laser_cycles": self.laser_cycles if self.first_of is None else self.first_of,
+            "most_counts": self.most_counts,
+            "coincidence": None if together is None else Coincidence(*together)._asdict(),
+        }
+        # Numbers of NumPy are none of JSON.
+        return self.bins, json.dumps(keys, default=lambda number: number.item())
 
     def _zones(self, counts: ArrayLike) -> tuple[NDArray[np.uint32], tuple[int, ...]]:
         numbers = whole("counts", counts)
@@ -96,13 +149,42 @@ class Detector:
             raise InputError("counts: are from 0 to 4294967295; give such")
         return np.ascontiguousarray(numbers.reshape(-1, self.bins), dtype=np.uint32), numbers.shape[:-1]
 
-    def range(self, counts: ArrayLike, *, false_alarm_rate: float = 1e-3, correct_walk: bool = True) -> Detected:
+    def crosstalk(self, counts: ArrayLike, *, fit: bool = False) -> NDArray[np.float64]:
+        """Photons of a cover glass in each bin of one histogram, for :meth:`range`: zones × bins.
+
+        Parameters
+        ----------
+        counts
+            Captures × zones × bins: of captures without a target, or of any captures with ``fit``.
+        fit
+            Take the echo nearest to the sensor in the sum of all captures for the glass.
+        """
+        if self.coincidence is not None:
+            raise InputError("coincidence: the light of a glass is not known from SPADs that fire together; leave it out")
+        flat, shape = self._zones(counts)
+        if len(shape) != 2:
+            raise InputError(f"counts: is an array of shape {(*shape, self.bins)}; give captures × zones × bins")
+        sums = flat.reshape(*shape, self.bins).sum(axis=0, dtype=np.uint64)
+        if sums.size and sums.max() > np.iinfo(np.uint32).max:
+            raise InputError("counts: are more than 4294967295 in all captures; give fewer captures")
+        return _gdtof.detector_crosstalk(self._described(), sums.astype(np.uint32), shape[0], fit)
+
+    def range(
+        self,
+        counts: ArrayLike,
+        *,
+        crosstalk: ArrayLike | None = None,
+        false_alarm_rate: float = 1e-3,
+        correct_walk: bool = True,
+    ) -> Detected:
         """Finds depths in histograms.
 
         Parameters
         ----------
         counts
             Whole numbers of any type, bins in the last axis, the earliest first.
+        crosstalk
+            Photons of a cover glass in each bin, in the shape of ``counts`` or of its last axes, as of :meth:`crosstalk`.
         false_alarm_rate
             Share of zones without an echo that may get a depth.
         correct_walk
@@ -114,7 +196,19 @@ class Detector:
             What cannot be, and what would help.
         """
         zones, shape = self._zones(counts)
-        found = _gdtof.detector_range(self._spelled(), zones, float(false_alarm_rate), correct_walk)
+        known = None
+        if crosstalk is not None:
+            light = np.asarray(crosstalk, dtype=np.float64)
+            if not (np.isfinite(light).all() and (light >= 0).all()):
+                raise InputError("crosstalk: holds what is no number of photons; give numbers from 0")
+            try:
+                light = np.broadcast_to(light, (*shape, self.bins))
+            except ValueError:
+                raise InputError(
+                    f"crosstalk: is an array of shape {light.shape}; give one of {(*shape, self.bins)} or its last axes"
+                ) from None
+            known = np.ascontiguousarray(light.reshape(-1, self.bins))
+        found = _gdtof.detector_range(self._described(), zones, known, float(false_alarm_rate), correct_walk)
 
         def of_first(name: str) -> NDArray[np.float64]:
             return np.ascontiguousarray(found[name][:, 0]).reshape(shape)
@@ -149,7 +243,7 @@ class Detector:
         """
         if not (np.isfinite(depth_m) and 0 <= photons < 1e18 and 0 <= background < 1e18):
             raise InputError("photons and background: are from 0 to 1e18, and depth_m is a number; give such")
-        return _gdtof.detector_expected(self._spelled(), (float(depth_m), float(photons), float(background)))
+        return _gdtof.detector_expected(self._described(), (float(depth_m), float(photons), float(background)))
 
     def check(self, counts: ArrayLike, expected: ArrayLike) -> list[Agreement]:
         """Whether counts are what this detector has that expects these means: one answer for each zone.
@@ -168,4 +262,4 @@ class Detector:
         means = np.ascontiguousarray(means.reshape(-1, means.shape[-1]))
         if not (np.isfinite(means).all() and (means >= 0).all()):
             raise InputError("expected: holds what is no mean; give numbers from 0")
-        return [Agreement(*one) for one in _gdtof.detector_agreement(self._spelled(), zones, means)]
+        return [Agreement(*one) for one in _gdtof.detector_agreement(self._described(), zones, means)]

@@ -18,7 +18,10 @@ __all__ = [
     "bin_edges",
     "confidence",
     "detector_agreement",
+    "detector_checked",
+    "detector_crosstalk",
     "detector_expected",
+    "detector_file",
     "detector_range",
     "expose",
     "frame",
@@ -196,17 +199,23 @@ def replay(
     waves: str | PathLike[str] | None,
     progress: Callable[[int], object] | None,
 ) -> dict[str, Any]: ...
+def detector_checked(described: tuple[int, str]) -> None: ...
+def detector_file(path: str) -> str: ...
+def detector_crosstalk(
+    described: tuple[int, str], sums: NDArray[np.uint32], histograms: int, is_fit: bool
+) -> NDArray[np.float64]: ...
 def detector_range(
-    detector: tuple[int, float, float, float, int | None],
+    described: tuple[int, str],
     counts: NDArray[np.uint32],
+    crosstalk: NDArray[np.float64] | None,
     false_alarm_rate: float,
     correct_walk: bool,
 ) -> dict[str, Any]: ...
 def detector_expected(
-    detector: tuple[int, float, float, float, int | None], light: tuple[float, float, float]
+    described: tuple[int, str], light: tuple[float, float, float]
 ) -> NDArray[np.float64]: ...
 def detector_agreement(
-    detector: tuple[int, float, float, float, int | None],
+    described: tuple[int, str],
     counts: NDArray[np.uint32],
     expected: NDArray[np.float64],
 ) -> list[tuple[float, int, float]]: ...

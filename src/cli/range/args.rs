@@ -21,12 +21,12 @@ pub(super) enum Format {
     Cnh,
 }
 
-/// Which photons a histogram counts.
+/// Which events a histogram counts.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Counts {
-    /// Every photon.
+    /// Every event: every photon, unless the detector's description has a coincidence.
     Every,
-    /// The first photon of each laser cycle.
+    /// The first event of each laser cycle.
     First,
 }
 
@@ -67,7 +67,11 @@ pub(in crate::cli) struct RangeArgs {
     /// frame: frame.json with sensor, scene, exposure and start values [default: the one beside the histograms].
     #[arg(long, value_name = "FILE")]
     pub(super) frame: Option<PathBuf>,
-    /// Length of a bin, ns, for all formats but frame and tmf8820, as the next six options.
+    /// Description of the detector (TOML) with the keys bin_width_ns or bin_edges_ns, start_ns, pulse_fwhm_ns, counts, laser_cycles,
+    /// most_counts and coincidence; for all formats but frame and tmf8820, as the next eight options, which go before it.
+    #[arg(long, value_name = "FILE")]
+    pub(super) detector: Option<PathBuf>,
+    /// Length of a bin, ns.
     #[arg(long, value_name = "NS")]
     pub(super) bin_width_ns: Option<f64>,
     /// Full width at half maximum of the laser pulse with all jitter, ns.
@@ -79,12 +83,16 @@ pub(in crate::cli) struct RangeArgs {
     /// Bins to look at, from 0, as in 4-50 [default: all].
     #[arg(long, value_name = "FIRST-LAST")]
     pub(super) bins: Option<String>,
-    /// Which photons a histogram counts [default: every].
+    /// Which events a histogram counts [default: every].
     #[arg(long, value_enum)]
     pub(super) counts: Option<Counts>,
-    /// Laser cycles of a histogram, with --counts first.
+    /// Laser cycles of a histogram, which --counts first and a coincidence need.
     #[arg(long, value_name = "N")]
     pub(super) laser_cycles: Option<u32>,
+    /// Light of a cover glass: a file with captures without a target, in the same format, or `fit` for the echo nearest to the sensor in the
+    /// sum of all captures.
+    #[arg(long, value_name = "FILE|fit")]
+    pub(super) crosstalk: Option<PathBuf>,
     /// Counts for each unit of a file's numbers, where they are rates (counts, cnh) [default: they are counts].
     #[arg(long, value_name = "N")]
     pub(super) counts_per_unit: Option<f64>,

@@ -1,17 +1,18 @@
-//! `gdtof range` of any sensor's histograms: tables, arrays, and logs of evaluation kits. No chip of ours is pretended.
+//! `gdtof range` of any sensor's histograms: tables, arrays, and logs of evaluation kits.
 
-use std::f64::consts::LN_2;
 use std::ops::Range;
 use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::args::{Counts, RangeArgs};
+use super::args::RangeArgs;
+use super::crosstalk;
+use super::detector::{described_detector, description, within};
 use super::returns::{shown, write_further, write_further_head};
 use crate::cli::voice::{note, say_json, tell};
 use crate::files::{HistogramFormat, Histograms, InputError, OutputFile, ZoneCounts};
-use crate::ranging::{Counted, DepthOptions, DetectedReturn, Detector, NoReturn};
+use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
 use crate::system::median;
@@ -50,21 +51,20 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         within("--counts-per-unit", per_unit, (1e-9, 1e9))?;
     }
     let kept = args.bins.as_deref().map(bins).transpose()?;
+    let described = description(args)?;
     let mut histograms = Histograms::read(&args.histograms, format, args.counts_per_unit)?;
-    let first_bin = kept.as_ref().map_or(0, |kept| kept.start);
-    let whole_bins = histograms.bins;
-    if let Some(kept) = kept {
-        if kept.end > histograms.bins {
-            let message = format!(
-                "ends at bin {}, and {} has bins 0 to {}; give bins that it has",
-                kept.end - 1,
-                args.histograms.display(),
-                histograms.bins - 1
-            );
-            return Err(InputError::new("--bins", message).into());
-        }
-        histograms.keep_bins(kept);
+    let whole = described_detector(args, &described, histograms.bins)?;
+    let kept = kept.unwrap_or(0..histograms.bins);
+    if kept.end > histograms.bins {
+        let message = format!(
+            "ends at bin {}, and {} has bins 0 to {}; give bins that it has",
+            kept.end - 1,
+            args.histograms.display(),
+            histograms.bins - 1
+        );
+        return Err(InputError::new("--bins", message).into());
     }
+    histograms.keep_bins(kept.clone());
     if histograms.cut_short > 0 {
         let (cut, all) = (histograms.cut_short, histograms.captures.len());
         note(format_args!(
@@ -78,15 +78,24 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
             "{repeated} of {all} zones have the counts of the zone before them, each of which has {TOO_MANY_FOR_CHANCE} or more; the logger may have repeated one zone"
         ));
     }
-    let detector = detector_of(args, histograms.bins)?;
-    let zones: Vec<Zone> = (histograms.captures.par_iter().enumerate())
+    let has_start = whole.has_start;
+    let detectors = (histograms.captures.iter().enumerate())
         .map(|(number, capture)| {
-            let begins_s = begins_s(args, &detector, (number, capture), whole_bins)?;
-            let detector = Detector {
-                begins_s: begins_s + first_bin as f64 * detector.bin_s,
-                ..detector
+            let begins_s = if has_start {
+                0.0
+            } else {
+                begins_s(args, &whole.detector, (number, capture))?
             };
-            range(args, &detector, &options, (number, capture))
+            Ok(whole.detector.later(begins_s).with_bins(kept.clone()))
+        })
+        .collect::<Result<Vec<Detector>, InputError>>()?;
+    let glass = match &args.crosstalk {
+        Some(source) => crosstalk::light(args, (source, format), (&histograms, kept), &detectors)?,
+        None => Vec::new(),
+    };
+    let zones: Vec<Zone> = (histograms.captures.par_iter().zip(&detectors).enumerate())
+        .map(|(number, (capture, detector))| {
+            range(args, (detector, &glass), &options, (number, capture))
         })
         .collect::<Result<Vec<Vec<Zone>>, InputError>>()?
         .into_iter()
@@ -98,7 +107,13 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
     if args.json {
         return say_json(&serde_json::json!({ "zones": zones }));
     }
-    Ok(tell(table(args, &zones))?)
+    let mut table = table(args, &zones);
+    if args.crosstalk.is_some() {
+        let lit = glass.iter().filter(|light| !light.is_empty()).count();
+        let row = format!("{lit} of {}", glass.len());
+        table.push("zones with light of a cover glass", row);
+    }
+    Ok(tell(table)?)
 }
 
 /// Zones whose histogram is that of the zone before them.
@@ -117,13 +132,18 @@ fn repeated(histograms: &Histograms) -> usize {
 /// The zones of one capture.
 fn range(
     args: &RangeArgs,
-    detector: &Detector,
+    (detector, glass): (&Detector, &[Vec<f64>]),
     options: &DepthOptions,
     (number, capture): (usize, &ZoneCounts),
 ) -> Result<Vec<Zone>, InputError> {
     let range_zone = |(zone, counts): (usize, &[u32])| {
+        let crosstalk = glass.get(zone).cloned().unwrap_or_default();
+        let detector = Detector {
+            crosstalk,
+            ..detector.clone()
+        };
         detector.check(counts).map_err(|error| {
-            let message = format!("zone {zone} {error}; correct --laser-cycles or --counts");
+            let message = format!("zone {zone} {error}; correct the description of the detector");
             InputError::new(args.histograms.display(), message)
         })?;
         let found = detector.returns(counts, options);
@@ -135,20 +155,16 @@ fn range(
             sensor_m: capture.own_depths_m.get(zone).copied().flatten(),
         })
     };
-    let zones = capture.counts.par_chunks_exact(detector.bins);
+    let zones = capture.counts.par_chunks_exact(detector.bins());
     zones.enumerate().map(range_zone).collect()
 }
 
-/// When bin 0 begins after the laser pulse has left.
+/// When bin 0 begins after the laser pulse has left, as the reference histogram of a capture shows; 0 without one.
 fn begins_s(
     args: &RangeArgs,
     detector: &Detector,
     (number, capture): (usize, &ZoneCounts),
-    whole_bins: usize,
 ) -> Result<f64, InputError> {
-    if let Some(start_ns) = args.start_ns {
-        return Ok(1e-9 * start_ns);
-    }
     let Some(reference) = &capture.reference else {
         return Ok(0.0);
     };
@@ -156,60 +172,13 @@ fn begins_s(
         let message = format!("capture {number} has {what}; say when bin 0 begins with --start-ns");
         InputError::new(args.histograms.display(), message)
     };
-    if reference.len() != whole_bins {
-        let bins = reference.len();
-        let what = format!("a reference histogram of {bins} bins beside zones of {whole_bins}");
+    if reference.len() != detector.bins() {
+        let (bins, zones) = (reference.len(), detector.bins());
+        let what = format!("a reference histogram of {bins} bins beside zones of {zones}");
         return Err(complain(what));
     }
     let begins_s = detector.begins_after_reference_s(reference);
     begins_s.ok_or_else(|| complain("no pulse in its reference histogram".into()))
-}
-
-/// The detector of the options, all of which are checked.
-fn detector_of(args: &RangeArgs, bins: usize) -> Result<Detector, InputError> {
-    let needed = |option: &str, value: Option<f64>| {
-        let why = "is needed to make depths of bins; give it";
-        value.ok_or_else(|| InputError::new(option, why))
-    };
-    let bin_ns = needed("--bin-width-ns", args.bin_width_ns)?;
-    within("--bin-width-ns", bin_ns, (1e-3, 1e6))?;
-    let fwhm_ns = needed("--pulse-fwhm-ns", args.pulse_fwhm_ns)?;
-    within("--pulse-fwhm-ns", fwhm_ns, (0.0, 1e6))?;
-    within("--start-ns", args.start_ns.unwrap_or(0.0), (-1e9, 1e9))?;
-    let most_ns = 0.5 * bin_ns * bins as f64;
-    if fwhm_ns > most_ns {
-        let message = format!(
-            "{fwhm_ns} is more than half of {bins} bins of {bin_ns} ns; give the width of the laser pulse"
-        );
-        return Err(InputError::new("--pulse-fwhm-ns", message));
-    }
-    let counted = match (args.counts.unwrap_or(Counts::Every), args.laser_cycles) {
-        (Counts::Every, None) => Counted::EveryPhoton,
-        (Counts::Every, Some(_)) => {
-            let message = "is for --counts first alone; leave it out";
-            return Err(InputError::new("--laser-cycles", message));
-        }
-        (Counts::First, Some(laser_cycles @ 1..)) => Counted::FirstPhoton { laser_cycles },
-        (Counts::First, _) => {
-            let message = "is needed with --counts first; give 1 or more";
-            return Err(InputError::new("--laser-cycles", message));
-        }
-    };
-    Ok(Detector {
-        bins,
-        bin_s: 1e-9 * bin_ns,
-        begins_s: 0.0,
-        pulse_sigma_s: 1e-9 * fwhm_ns / (8.0 * LN_2).sqrt(),
-        counted,
-    })
-}
-
-fn within(option: &str, value: f64, (least, most): (f64, f64)) -> Result<(), InputError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    let message = format!("{value} is impossible; give {least} to {most}");
-    Err(InputError::new(option, message))
 }
 
 /// The bins of `4-50`, both of them included.

@@ -2,6 +2,8 @@
 
 mod args;
 mod counts;
+mod crosstalk;
+mod detector;
 mod frame;
 mod returns;
 mod tmf8820;
@@ -22,7 +24,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     // What each option is for.
     const ANY: &[Format] = &[Counts, Tmf882x, Tmf8829, Cnh];
     const SEEN: &[Format] = &[Frame, Counts, Tmf882x, Tmf8829, Cnh];
-    let options: [(&str, bool, &[Format]); 13] = [
+    let options: [(&str, bool, &[Format]); 15] = [
         ("--fit", args.fit.is_some(), &[Tmf8820]),
         (
             "--save-calibration",
@@ -37,6 +39,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         ("--frame", args.frame.is_some(), &[Frame]),
         ("--false-alarm-rate", args.false_alarm_rate.is_some(), SEEN),
         ("--no-walk-correction", args.no_walk_correction, SEEN),
+        ("--detector", args.detector.is_some(), ANY),
+        ("--crosstalk", args.crosstalk.is_some(), ANY),
         ("--bin-width-ns", args.bin_width_ns.is_some(), ANY),
         ("--pulse-fwhm-ns", args.pulse_fwhm_ns.is_some(), ANY),
         ("--start-ns", args.start_ns.is_some(), ANY),

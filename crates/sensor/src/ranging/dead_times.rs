@@ -23,7 +23,10 @@ impl WalkCorrection {
         }
         let of_mean = response.dead_time_spread / (response.counting.spads as f64).sqrt();
         let cycles = f64::from(self.laser_cycles);
-        let chances = response.with_dead_times(1.0 + of_mean).chances(light);
+        let chances = response
+            .clone()
+            .with_dead_times(1.0 + of_mean)
+            .chances(light);
         let counts: Vec<f64> = chances.iter().map(|chance| chance * cycles).collect();
         let likelihood = Likelihood {
             response,

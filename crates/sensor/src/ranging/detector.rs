@@ -1,54 +1,77 @@
-//! Depths from the histograms of any sensor: how long its bins are, and which photons they count.
+//! Depths from the histograms of any sensor: how long its bins are, and which events they count.
 //!
 //! ```text
-//!   every photon   a bin counts each photon that comes in it               counts are Poisson numbers
-//!   first photon   a laser cycle counts its first photon, in one bin       later bins see what is left (pile-up)
+//!   an event      a photon, or the photon with which so many SPADs fire together
+//!   every event   a bin counts each event that comes in it                 counts are Poisson numbers
+//!   first event   a laser cycle counts its first event, in one bin         later bins see what is left (pile-up)
 //! ```
 //!
 //! The echo finder is that of our own chip, whose bins count at most once a laser cycle. A histogram is taken for one of a hundred times
-//! as many laser cycles with as much less light, so that the bins are hardly tied together. What ties first photons together is in the mean
-//! histogram ([`expected`](super::expected)); the search for echoes knows from the counts before a bin in what share of laser cycles it was
-//! still to count (Coates 1968, doi 10.1088/0022-3735/1/8/437).
+//! as many laser cycles with as much less light, so that the bins are hardly tied together. What ties events together is in the mean
+//! histogram ([`expected`](super::expected)), and so is light that is known, as that of a cover glass. The search for echoes knows from the
+//! counts before a bin in what share of laser cycles it was still to count (Coates 1968, doi 10.1088/0022-3735/1/8/437).
 //!
 //! No timing of gates is asked for.
 
+mod crosstalk;
+mod description;
 mod mean;
 
+use std::ops::Range;
+
 use super::arrival::{ArrivalOptions, arrival};
-use super::expected::{OtherBins, Response};
+use super::expected::{FiringTogether, OtherBins, Response};
 use super::finder::{DepthOptions, EchoFinder};
+use super::peak::median;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
+pub use description::{BadDetector, DescribedCoincidence, DetectorDescription};
 pub use mean::{Agreement, SurfaceLight};
 
-/// Parts that a laser cycle of first photons is cut into; and laser cycles for each count of the fullest bin, where every photon counts.
+/// Parts that a laser cycle is cut into; and laser cycles for each count of the fullest bin, where these are not known.
 const PARTS: u32 = 100;
 
-/// Which photons a detector counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Lengths of bins that differ by less than this are equal.
+const EQUAL: f64 = 1e-6;
+
+/// Which events of a laser cycle count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Counted {
     /// All of them.
-    EveryPhoton,
-    /// The first of each laser cycle.
-    FirstPhoton {
-        /// Laser cycles of a histogram.
-        laser_cycles: u32,
-    },
+    Every,
+    /// The first one.
+    First,
 }
 
-/// What counts photons: bins of one length, and laser pulses of one width.
+/// SPADs that fire together make an event. The output of a SPAD is high for a time after a photon.
 #[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coincidence {
+    /// How many outputs must be high, 1 or more.
+    pub spads: u32,
+    /// How long an output is high after the last photon of its SPAD, s.
+    pub within_s: f64,
+    /// SPADs on which the light comes evenly.
+    pub of: u32,
+}
+
+/// What counts photons, and the laser pulses that it sees.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
-    /// Bins of a histogram.
-    pub bins: usize,
-    /// Length of a bin, s.
-    pub bin_s: f64,
-    /// When the first bin begins after the centre of the laser pulse has left, s.
-    pub begins_s: f64,
+    /// Where bins begin, and the last one ends, after the centre of the laser pulse has left, s: one more than bins, rising.
+    pub edges_s: Vec<f64>,
     /// Standard deviation of the laser pulse with all jitter, s.
     pub pulse_sigma_s: f64,
-    /// Which photons count.
+    /// Which events count.
     pub counted: Counted,
+    /// Laser cycles of a histogram. It may be unknown where every photon counts.
+    pub laser_cycles: Option<u32>,
+    /// What an event is, if it is not a photon.
+    pub coincidence: Option<Coincidence>,
+    /// Counts at which a bin stops.
+    pub most_counts: Option<u32>,
+    /// Photons that come to each bin in all laser cycles without a target, as from a cover glass; empty without any.
+    pub crosstalk: Vec<f64>,
 }
 
 /// An echo in a histogram.
@@ -81,14 +104,29 @@ pub enum NoReturn {
     BehindSensor,
 }
 
-/// More counts than laser cycles, where only the first photon of each counts.
+/// Counts that a detector cannot have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "has {counts} counts in {laser_cycles} laser cycles, each of which counts its first photon only"
-)]
-pub struct TooManyCounts {
-    counts: u64,
-    laser_cycles: u32,
+pub enum TooManyCounts {
+    /// More than laser cycles.
+    #[error(
+        "has {counts} counts in {laser_cycles} laser cycles, each of which counts its first event only"
+    )]
+    InAll {
+        /// Counts of all bins.
+        counts: u64,
+        /// Laser cycles of the histogram.
+        laser_cycles: u32,
+    },
+    /// More than a bin may have.
+    #[error("has {counts} counts in bin {bin}, where a bin stops at {most}")]
+    InABin {
+        /// The bin.
+        bin: usize,
+        /// Its counts.
+        counts: u32,
+        /// The most.
+        most: u32,
+    },
 }
 
 impl NoReturn {
@@ -101,20 +139,62 @@ impl NoReturn {
 }
 
 impl Detector {
+    /// Edges of so many bins of `bin_s` seconds, the first of which begins at `begins_s`.
+    pub fn equal_edges_s(bins: usize, begins_s: f64, bin_s: f64) -> Vec<f64> {
+        let edge_s = |edge| begins_s + edge as f64 * bin_s;
+        (0..=bins).map(edge_s).collect()
+    }
+
+    /// Bins of a histogram.
+    pub fn bins(&self) -> usize {
+        self.edges_s.len() - 1
+    }
+
+    /// Length of a bin, s: the mean of all.
+    pub fn bin_s(&self) -> f64 {
+        (self.edges_s[self.bins()] - self.edges_s[0]) / self.bins() as f64
+    }
+
+    /// The same with all bins so much later, s.
+    pub fn later(&self, by_s: f64) -> Self {
+        let mut later = self.clone();
+        later.edges_s.iter_mut().for_each(|edge_s| *edge_s += by_s);
+        later
+    }
+
+    /// The same with these bins alone.
+    pub fn with_bins(&self, kept: Range<usize>) -> Self {
+        let mut some = self.clone();
+        some.edges_s = self.edges_s[kept.start..=kept.end].to_vec();
+        if !self.crosstalk.is_empty() {
+            some.crosstalk = self.crosstalk[kept].to_vec();
+        }
+        some
+    }
+
     /// Checks that a histogram may be this detector's.
     ///
     /// # Errors
     /// More counts than the detector can have.
     pub fn check(&self, counts: &[u32]) -> Result<(), TooManyCounts> {
         let all: u64 = counts.iter().map(|&n| u64::from(n)).sum();
-        match self.counted {
-            Counted::FirstPhoton { laser_cycles } if all > u64::from(laser_cycles) => {
-                Err(TooManyCounts {
-                    counts: all,
-                    laser_cycles,
-                })
-            }
-            _ => Ok(()),
+        if self.counted == Counted::First
+            && let Some(laser_cycles) = self.laser_cycles
+            && all > u64::from(laser_cycles)
+        {
+            return Err(TooManyCounts::InAll {
+                counts: all,
+                laser_cycles,
+            });
+        }
+        let most = self.most_counts.unwrap_or(u32::MAX);
+        match counts.iter().position(|&count| count > most) {
+            Some(bin) => Err(TooManyCounts::InABin {
+                bin,
+                counts: counts[bin],
+                most,
+            }),
+            None => Ok(()),
         }
     }
 
@@ -127,13 +207,16 @@ impl Detector {
         counts: &[u32],
         options: &DepthOptions,
     ) -> Result<Vec<DetectedReturn>, NoReturn> {
-        debug_assert_eq!(counts.len(), self.bins);
-        let finder = self.finder(counts, options);
-        let sighting = match self.counted {
-            Counted::EveryPhoton => finder.find(counts),
-            Counted::FirstPhoton { laser_cycles } => {
-                finder.find_in(counts, &shares_of_cycles(counts, laser_cycles))
-            }
+        debug_assert_eq!(counts.len(), self.bins());
+        let laser_cycles = self.parts_of_cycles(counts);
+        let bin_s = self.bin_s();
+        let response = self.response(laser_cycles);
+        let finder =
+            EchoFinder::of_response(response, bin_s, (laser_cycles, self.most_counts), options);
+        let sighting = if self.counted == Counted::Every && !self.has_unlike_bins() {
+            finder.find(counts)
+        } else {
+            finder.find_over(counts, &self.dark_counts(counts, laser_cycles))
         };
         let sighting = sighting.ok_or(NoReturn::NoSignificantPeak)?;
         if !sighting.is_significant {
@@ -142,23 +225,30 @@ impl Detector {
         if sighting.is_saturated {
             return Err(NoReturn::Saturated);
         }
-        let to_m = 0.5 * SPEED_OF_LIGHT_M_PER_S * self.bin_s;
+        let to_m = 0.5 * SPEED_OF_LIGHT_M_PER_S;
+        let law = self.law(laser_cycles);
         let place_m = |position_bins: f64| {
-            0.5 * SPEED_OF_LIGHT_M_PER_S * self.begins_s + (position_bins + 0.5) * to_m
+            let (bins, _) = law.time(position_bins);
+            to_m * (self.edges_s[0] + (bins + 0.5) * bin_s)
         };
-        let laser_cycles = f64::from(self.laser_cycles(counts));
-        let bound_m = sighting.bound_bins.map(|bins| bins * to_m);
+        // A bound is in bins of the place.
+        let bound_m = |position_bins: f64, bound_bins: Option<f64>| {
+            let (_, length_bins) = law.time(position_bins);
+            bound_bins.map(|bins| bins * length_bins * bin_s * to_m)
+        };
+        let spread_m = |bins: f64| bins * bin_s * to_m;
+        let first_bound_m = bound_m(sighting.position_bins, sighting.bound_bins);
         let depth_m = place_m(sighting.position_bins);
-        if depth_m < -bound_m.map_or(to_m, |bound_m| 5.0 * bound_m) {
+        if depth_m < -first_bound_m.map_or(bin_s * to_m, |bound_m| 5.0 * bound_m) {
             return Err(NoReturn::BehindSensor);
         }
         let spread_bins = sighting.light.and_then(|light| finder.spread_bins(&light));
         let first = DetectedReturn {
             depth_m,
-            bound_m,
-            spread_m: bound_m.and(spread_bins).map(|bins| bins * to_m),
+            bound_m: first_bound_m,
+            spread_m: first_bound_m.and(spread_bins).map(spread_m),
             photons: match sighting.light {
-                Some(light) => light.signal * laser_cycles,
+                Some(light) => light.signal * f64::from(laser_cycles),
                 None => sighting.peak.signal_counts,
             },
             confidence: sighting.confidence,
@@ -166,9 +256,9 @@ impl Detector {
         let others = sighting.others.into_iter().flatten();
         let others = others.map(|other| DetectedReturn {
             depth_m: place_m(other.position_bins),
-            bound_m: other.bound_bins.map(|bins| bins * to_m),
-            spread_m: other.spread_bins.map(|bins| bins * to_m),
-            photons: other.photons * laser_cycles,
+            bound_m: bound_m(other.position_bins, other.bound_bins),
+            spread_m: other.spread_bins.map(spread_m),
+            photons: other.photons * f64::from(laser_cycles),
             confidence: other.confidence,
         });
         Ok(std::iter::once(first).chain(others).collect())
@@ -178,156 +268,87 @@ impl Detector {
     /// pulse.
     pub fn begins_after_reference_s(&self, reference: &[u32]) -> Option<f64> {
         let pulse = arrival(reference, &ArrivalOptions::default())?;
-        Some(-(pulse.position_bins + 0.5) * self.bin_s)
+        Some(-(pulse.position_bins + 0.5) * self.bin_s())
     }
 
-    /// Laser cycles in which our bins would count like this detector's.
-    fn laser_cycles(&self, counts: &[u32]) -> u32 {
-        let most = match self.counted {
-            Counted::FirstPhoton { laser_cycles } => laser_cycles,
-            Counted::EveryPhoton => counts.iter().copied().max().unwrap_or(0),
+    /// Parts of laser cycles in which our bins would count like this detector's.
+    fn parts_of_cycles(&self, counts: &[u32]) -> u32 {
+        let fullest = counts.iter().copied().max().unwrap_or(0);
+        let cycles = self.laser_cycles.unwrap_or(fullest).max(1);
+        // A bin of a laser cycle may count several photons.
+        cycles.max(fullest).saturating_mul(PARTS)
+    }
+
+    fn has_unlike_bins(&self) -> bool {
+        let bin_s = self.bin_s();
+        let is_unlike = |ends: &[f64]| ((ends[1] - ends[0]) / bin_s - 1.0).abs() > EQUAL;
+        !self.crosstalk.is_empty() || self.edges_s.windows(2).any(is_unlike)
+    }
+
+    /// How bins count, in `all_parts` parts of all laser cycles.
+    fn law(&self, all_parts: u32) -> OtherBins {
+        let bin_s = self.bin_s();
+        let cycles = match self.laser_cycles {
+            Some(cycles) => f64::from(cycles),
+            None => f64::from(all_parts),
         };
-        most.max(1).saturating_mul(PARTS)
-    }
-
-    fn finder(&self, counts: &[u32], options: &DepthOptions) -> EchoFinder {
-        let law = match self.counted {
-            Counted::EveryPhoton => OtherBins::EveryPhoton,
-            Counted::FirstPhoton { .. } => OtherBins::FirstPhoton {
-                parts: f64::from(PARTS),
+        let edge_bins = |edge_s: &f64| (edge_s - self.edges_s[0]) / bin_s - 0.5;
+        OtherBins {
+            edges: if self.has_unlike_bins() {
+                self.edges_s.iter().map(edge_bins).collect()
+            } else {
+                OtherBins::equal_edges(self.bins())
             },
-        };
-        let sigma_bins = self.pulse_sigma_s / self.bin_s;
-        let response = Response::of_other_bins(self.bins, sigma_bins, law);
-        EchoFinder::of_response(response, self.bin_s, self.laser_cycles(counts), options)
+            known: self.crosstalk.iter().map(|all| all / cycles).collect(),
+            together: self.coincidence.map(|coincidence| FiringTogether {
+                least: coincidence.spads,
+                within_bins: coincidence.within_s / bin_s,
+                of_spads: coincidence.of,
+            }),
+            first_only: self.counted == Counted::First,
+            parts: f64::from(all_parts) / cycles,
+        }
     }
-}
 
-/// The share of laser cycles in which each bin was still to count, 1 on average.
-fn shares_of_cycles(counts: &[u32], laser_cycles: u32) -> Vec<f64> {
-    let mut left = f64::from(laser_cycles);
-    let shares = counts.iter().map(|&count| {
-        let share = left.max(1e-3);
-        left -= f64::from(count);
-        share
-    });
-    let mut shares: Vec<f64> = shares.collect();
-    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-    shares.iter_mut().for_each(|share| *share /= mean);
-    shares
+    fn response(&self, all_parts: u32) -> Response {
+        Response::of_other_bins(self.pulse_sigma_s / self.bin_s(), self.law(all_parts))
+    }
+
+    /// Counts that bins would have without an echo, with the background of most bins. Laser cycles whose first event came before a bin
+    /// do not count there.
+    fn dark_counts(&self, counts: &[u32], all_parts: u32) -> Vec<f64> {
+        let response = self.response(all_parts);
+        let law = self.law(all_parts);
+        let cycles = f64::from(all_parts) / law.parts;
+        let mut left = cycles;
+        let open = counts.iter().map(|&count| {
+            let open = left.max(1e-3 * cycles);
+            if law.first_only {
+                left -= f64::from(count);
+            }
+            open
+        });
+        let open: Vec<f64> = open.collect();
+        let background = |(bin, &count): (usize, &u32)| {
+            let length = law.edges[bin + 1] - law.edges[bin];
+            let known = law.known.get(bin).map_or(0.0, |known| known / law.parts);
+            let chance = f64::from(count) / (open[bin] * law.parts);
+            (law.steady_light(chance / length) - known / length).max(0.0)
+        };
+        let levels: Vec<f64> = counts.iter().enumerate().map(background).collect();
+        // Half a count in all bins at least, so that none is impossible.
+        let least = law.steady_light(0.5 / (counts.len() as f64 * f64::from(all_parts)));
+        let dark = law.dark_events(&response, median(levels.iter()).max(least));
+        let counted = |(open, events): (&f64, f64)| {
+            if law.first_only {
+                open * -libm::expm1(-events)
+            } else {
+                open * events
+            }
+        };
+        open.iter().zip(dark).map(counted).collect()
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::rngs::StdRng;
-    use rand::{RngExt, SeedableRng};
-
-    pub(super) const BINS: usize = 64;
-    pub(super) const LASER_CYCLES: u32 = 2000;
-    pub(super) const FIRST: Counted = Counted::FirstPhoton {
-        laser_cycles: LASER_CYCLES,
-    };
-
-    pub(super) fn detector(counted: Counted) -> Detector {
-        Detector {
-            bins: BINS,
-            bin_s: 1e-9,
-            begins_s: 20e-9,
-            pulse_sigma_s: 0.8e-9,
-            counted,
-        }
-    }
-
-    /// A number of standard normal distribution: the sum of twelve even ones, less six.
-    fn normal(random: &mut StdRng) -> f64 {
-        (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
-    }
-
-    /// A histogram of an echo at `place_bins` with `signal` photons a laser cycle, over `background` photons in all bins, photon by photon.
-    pub(super) fn histogram(
-        random: &mut StdRng,
-        detector: &Detector,
-        (place_bins, signal, background): (f64, f64, f64),
-    ) -> Vec<u32> {
-        let mut counts = vec![0; BINS];
-        let sigma_bins = detector.pulse_sigma_s / detector.bin_s;
-        for _ in 0..LASER_CYCLES {
-            let mut times = Vec::new();
-            // Each photon is one of twenty that may come: nearly a Poisson number.
-            for _ in 0..20 {
-                if random.random::<f64>() < signal / 20.0 {
-                    times.push(place_bins + 0.5 + sigma_bins * normal(random));
-                }
-                if random.random::<f64>() < background / 20.0 {
-                    times.push(BINS as f64 * random.random::<f64>());
-                }
-            }
-            times.retain(|time| (0.0..BINS as f64).contains(time));
-            if detector.counted == FIRST {
-                let first = times.iter().copied().min_by(f64::total_cmp);
-                times = first.into_iter().collect();
-            }
-            for time in times {
-                counts[time as usize] += 1;
-            }
-        }
-        counts
-    }
-
-    #[test]
-    fn depths_of_photons_drawn_one_by_one_keep_their_bounds() {
-        let mut random = StdRng::seed_from_u64(1);
-        for counted in [Counted::EveryPhoton, FIRST] {
-            let detector = detector(counted);
-            let to_m = 0.5 * SPEED_OF_LIGHT_M_PER_S * detector.bin_s;
-            for (signal, background) in [(0.05, 0.2), (0.3, 0.5), (1.5, 0.5)] {
-                let (mut squares, mut sum, mut bounds, mut photons) = (0.0, 0.0, 0.0, 0.0);
-                const REPEATS: usize = 40;
-                for repeat in 0..REPEATS {
-                    let place_bins = 25.0 + 0.37 * repeat as f64 % 10.0;
-                    let light = (place_bins, signal, background);
-                    let counts = histogram(&mut random, &detector, light);
-                    detector.check(&counts).unwrap();
-                    let found = detector.returns(&counts, &DepthOptions::default()).unwrap();
-                    let first = found[0];
-                    let true_m = (20.0 + place_bins + 0.5) * to_m;
-                    let off_m = first.depth_m - true_m;
-                    let bound_m = first.bound_m.unwrap();
-                    assert!(
-                        off_m.abs() < 5.0 * bound_m,
-                        "{counted:?} {light:?} {first:?}"
-                    );
-                    squares += off_m * off_m;
-                    sum += off_m;
-                    bounds += bound_m * bound_m;
-                    photons += first.photons / f64::from(LASER_CYCLES);
-                }
-                let of = REPEATS as f64;
-                let (rms_m, bound_m) = ((squares / of).sqrt(), (bounds / of).sqrt());
-                assert!(
-                    rms_m < 1.4 * bound_m,
-                    "{counted:?} {signal}: {rms_m} {bound_m}"
-                );
-                assert!((sum / of).abs() < 4.0 * bound_m / of.sqrt());
-                assert!(
-                    (photons / of / signal - 1.0).abs() < 0.1,
-                    "{counted:?} {signal}: {photons}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn background_alone_has_no_return_and_impossible_counts_are_refused() {
-        let mut random = StdRng::seed_from_u64(2);
-        let every = detector(Counted::EveryPhoton);
-        let dark = histogram(&mut random, &every, (20.0, 0.0, 0.8));
-        let none = every.returns(&dark, &DepthOptions::default());
-        assert_eq!(none, Err(NoReturn::NoSignificantPeak));
-        let first = detector(FIRST);
-        let mut many = vec![0; BINS];
-        many[3] = LASER_CYCLES + 1;
-        assert!(every.check(&many).is_ok() && first.check(&many).is_err());
-    }
-}
+mod tests;

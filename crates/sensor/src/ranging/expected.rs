@@ -16,6 +16,8 @@
 
 mod other_bins;
 
+use std::sync::Arc;
+
 use smallvec::smallvec;
 
 use super::counting::Counting;
@@ -27,7 +29,7 @@ use crate::chip::{EventType, SensorConfig};
 use crate::numerics::Dual;
 use crate::photon::{EchoWidth, TAIL_REACH};
 
-pub(super) use other_bins::OtherBins;
+pub(super) use other_bins::{FiringTogether, OtherBins};
 
 /// Steps to a bin, at least.
 const STEPS: usize = 4;
@@ -76,7 +78,7 @@ pub(super) enum Steps {
 }
 
 /// How a macropixel answers to light.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Response {
     /// Histogram bins.
     pub(crate) bins: usize,
@@ -88,7 +90,7 @@ pub struct Response {
     /// Standard deviation of dead times, relative to their mean.
     pub(super) dead_time_spread: f64,
     /// Of bins that count otherwise; dead time says nothing there.
-    other_bins: Option<OtherBins>,
+    other_bins: Option<Arc<OtherBins>>,
 }
 
 impl Response {
@@ -125,9 +127,9 @@ impl Response {
     }
 
     /// Of a sensor whose bins are not ours.
-    pub(super) fn of_other_bins(bins: usize, pulse_sigma_bins: f64, law: OtherBins) -> Self {
+    pub(super) fn of_other_bins(pulse_sigma_bins: f64, law: OtherBins) -> Self {
         Response {
-            bins,
+            bins: law.edges.len() - 1,
             pulse_sigma_bins: pulse_sigma_bins.max(LEAST_SIGMA),
             tail: None,
             counting: Counting {
@@ -143,7 +145,7 @@ impl Response {
                 crosstalk: 0.0,
             },
             dead_time_spread: 0.0,
-            other_bins: Some(law),
+            other_bins: Some(Arc::new(law)),
         }
     }
 
@@ -155,7 +157,7 @@ impl Response {
             (EventType::Equal, 0) => 0,
             _ => return None,
         };
-        let mut other = *self;
+        let mut other = self.clone();
         other.counting.event_type = EventType::Greater;
         other.counting.threshold = threshold;
         Some(other)
@@ -165,6 +167,16 @@ impl Response {
     pub(super) fn with_dead_times(mut self, factor: f64) -> Self {
         self.dead.time_bins *= factor;
         self
+    }
+
+    /// The light of a bin that counts with `chance`, photons in a bin and laser cycle, if SPADs are ready for it and more light makes it
+    /// count more.
+    pub(super) fn steady_light(&self, chance: f64) -> f64 {
+        if let Some(law) = &self.other_bins {
+            return law.steady_light(chance);
+        }
+        let fired = self.counting.fired_for(chance.min(0.999));
+        -(self.counting.spads as f64) * libm::log1p(-fired)
     }
 
     /// Dead time, bins.
@@ -232,7 +244,7 @@ impl Response {
 
     /// The chances with their slopes with the first K parameters.
     pub(super) fn chances_of<const K: usize>(&self, light: &EchoLight, steps: Steps) -> OfBins<K> {
-        if let Some(law) = self.other_bins {
+        if let Some(law) = &self.other_bins {
             return law.chances(self, light);
         }
         let steps = self.steps(light, steps);

@@ -75,7 +75,7 @@ pub struct Sighting {
 pub struct UnequalBins;
 
 /// Finds echoes in the histograms of one sensor and exposure.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EchoFinder {
     /// Length of a bin, s.
     pub bin_s: f64,
@@ -138,7 +138,7 @@ impl EchoFinder {
             Tdc::Clocked if config.front_end.joins() => Err(WalkLeft::JoinedSpads),
             Tdc::Clocked if !recovers => Err(WalkLeft::ShortLaserCycle),
             Tdc::Clocked => Ok(WalkCorrection {
-                response: complement.unwrap_or(response),
+                response: complement.clone().unwrap_or_else(|| response.clone()),
                 laser_cycles,
             }),
         };
@@ -151,28 +151,27 @@ impl EchoFinder {
             full: (config.overflow == Overflow::Saturate && capacity < laser_cycles)
                 .then_some(capacity),
             walk: options.correct_walk.then_some(walk),
-            uncounted_of: complement.map(|_| laser_cycles),
+            uncounted_of: complement.is_some().then_some(laser_cycles),
         })
     }
 
-    /// For counts of a detector with this response in `laser_cycles`, with bins of `bin_s` seconds each.
+    /// For counts of a detector with this response in `laser_cycles`, with bins of `bin_s` seconds on average, which stop at `full`.
     pub(super) fn of_response(
         response: Response,
         bin_s: f64,
-        laser_cycles: u32,
+        (laser_cycles, full): (u32, Option<u32>),
         options: &DepthOptions,
     ) -> Self {
-        let walk = WalkCorrection {
-            response,
-            laser_cycles,
-        };
         EchoFinder {
             bin_s,
             peak: options.peak,
             ln_false_alarm: libm::log(options.false_alarm_rate),
             scan: Scan::matched(response.pulse_sigma_bins, response.bins, laser_cycles),
-            full: None,
-            walk: options.correct_walk.then_some(Ok(walk)),
+            full,
+            walk: options.correct_walk.then_some(Ok(WalkCorrection {
+                response,
+                laser_cycles,
+            })),
             uncounted_of: None,
         }
     }
@@ -199,6 +198,16 @@ impl EchoFinder {
         })
     }
 
+    /// The same where bins have `dark` counts without an echo, times any factor.
+    pub(super) fn find_over(&self, counts: &[u32], dark: &[f64]) -> Option<Sighting> {
+        let mean = dark.iter().sum::<f64>() / dark.len() as f64;
+        let usual = median(dark.iter());
+        let shares: Vec<f64> = dark.iter().map(|dark| dark / mean).collect();
+        self.sighting(counts, self.scan.least_likely(counts, &shares), &|bin| {
+            dark[bin] / usual
+        })
+    }
+
     /// What `counts` say whose fullest stretch is `stretch`; `share` is that of each bin in light that comes at any time alike.
     fn sighting(
         &self,
@@ -222,8 +231,11 @@ impl EchoFinder {
         let is_significant = stretch.ln_false_alarm <= self.ln_false_alarm;
         // Where there is no depth anyway, nothing is known of the light either.
         let corrects = is_significant && !is_saturated;
-        let walk = self.walk.filter(|_| corrects);
-        let whole = walk.map(|walk| walk.and_then(|walk| walk.correct(&real, &peak)));
+        let walk = self.walk.as_ref().filter(|_| corrects);
+        let whole = walk.map(|walk| match walk {
+            Ok(walk) => walk.correct(&real, &peak),
+            Err(left) => Err(*left),
+        });
         let (fitted, others) = if corrects {
             self.beside(&real, &peak, whole, share)
         } else {
@@ -277,7 +289,7 @@ impl EchoFinder {
         whole: Option<Result<Corrected, WalkLeft>>,
         share: &dyn Fn(usize) -> f64,
     ) -> (Option<Result<Corrected, WalkLeft>>, Others) {
-        let walk = self.walk.and_then(Result::ok);
+        let walk = self.walk_correction();
         let light = whole.and_then(Result::ok).map(|c| c.light);
         let flat = |per_bin: f64| (0..counts.len()).map(|bin| per_bin * share(bin)).collect();
         let mut search = Search {
@@ -335,7 +347,7 @@ impl EchoFinder {
 
     /// A further echo, fitted where its counts are those of one.
     fn as_return(&self, search: &Search<'_>, found: &Found, is_explained: bool) -> Return {
-        let walk = self.walk.and_then(Result::ok);
+        let walk = self.walk_correction();
         let Found {
             bins,
             peak_bin,
@@ -370,9 +382,13 @@ impl EchoFinder {
         }
     }
 
+    fn walk_correction(&self) -> Option<&WalkCorrection> {
+        self.walk.as_ref()?.as_ref().ok()
+    }
+
     /// Standard deviation of what widens the pulse to this echo, bins.
     pub fn spread_bins(&self, light: &EchoLight) -> Option<f64> {
-        let walk = self.walk?.ok()?;
+        let walk = self.walk_correction()?;
         let (echo, pulse) = (light.sigma_bins, walk.response.pulse_sigma_bins);
         Some((echo * echo - pulse * pulse).max(0.0).sqrt())
     }
@@ -389,7 +405,7 @@ impl EchoFinder {
 
     /// What is said of an echo's place: the least that its counts allow, and what its unknown shape and unequal dead times add.
     fn bound_bins(&self, corrected: &Corrected) -> f64 {
-        let Some(Ok(walk)) = self.walk else {
+        let Some(walk) = self.walk_correction() else {
             return corrected.bound_bins;
         };
         let of_a_spad = corrected.light.signal / walk.response.counting.spads as f64;
@@ -404,7 +420,7 @@ impl EchoFinder {
 
     /// Whether an echo is so strong that its counts do not tell its place.
     fn is_lost(&self, corrected: &Corrected) -> bool {
-        let Some(Ok(walk)) = self.walk else {
+        let Some(walk) = self.walk_correction() else {
             return false;
         };
         let of_a_spad = corrected.light.signal / walk.response.counting.spads as f64;

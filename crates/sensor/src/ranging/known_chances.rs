@@ -61,7 +61,7 @@ pub(super) fn keep(response: &Response, light: &EchoLight, steps: usize, chances
     RING.with_borrow_mut(|ring| {
         if ring.known.len() < MOST_KEPT {
             ring.known.push(Known {
-                response: *response,
+                response: response.clone(),
                 light: *light,
                 steps,
                 chances: [Dual::ZERO; MOST_BINS],
@@ -69,7 +69,7 @@ pub(super) fn keep(response: &Response, light: &EchoLight, steps: usize, chances
             ring.oldest = ring.known.len() - 1;
         }
         let known = &mut ring.known[ring.oldest];
-        (known.response, known.light, known.steps) = (*response, *light, steps);
+        (known.response, known.light, known.steps) = (response.clone(), *light, steps);
         known.chances[..chances.len()].copy_from_slice(chances);
         ring.oldest = (ring.oldest + 1) % MOST_KEPT;
     });

@@ -22,7 +22,8 @@ mod walk;
 pub use arrival::{ArrivalOptions, arrival};
 pub use calibration::{Calibration, CalibrationError, Echo, ZoneCalibration};
 pub use detector::{
-    Agreement, Counted, DetectedReturn, Detector, NoReturn, SurfaceLight, TooManyCounts,
+    Agreement, BadDetector, Coincidence, Counted, DescribedCoincidence, DetectedReturn, Detector,
+    DetectorDescription, NoReturn, SurfaceLight, TooManyCounts,
 };
 pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};

@@ -96,7 +96,7 @@ impl WalkLeft {
 }
 
 /// Takes the range walk out of peaks.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct WalkCorrection {
     /// What the macropixels make of light.
     pub response: Response,
@@ -318,7 +318,8 @@ impl WalkCorrection {
         background_per_bin: f64,
     ) -> Option<EchoLight> {
         let (signal, moment) = bins.fold((0.0, 0.0), |(signal, moment), bin| {
-            let of_bin = (self.light(counts[bin] / cycles) - background_per_bin).max(0.0);
+            let of_bin =
+                (self.response.steady_light(counts[bin] / cycles) - background_per_bin).max(0.0);
             (signal + of_bin, moment + of_bin * bin as f64)
         });
         (signal > 0.0).then(|| EchoLight {
@@ -331,7 +332,8 @@ impl WalkCorrection {
 
     /// The background of bins with this mean count, photons a bin.
     pub(crate) fn background_of(&self, counts_per_bin: f64) -> f64 {
-        self.light((counts_per_bin / f64::from(self.laser_cycles)).max(0.0))
+        self.response
+            .steady_light((counts_per_bin / f64::from(self.laser_cycles)).max(0.0))
     }
 
     /// A start from the light that each bin of the peak had, if it was alone; `None` where bins do not tell.
@@ -382,13 +384,6 @@ impl WalkCorrection {
         of_bins.max(1.5 * self.response.pulse_sigma_bins)
     }
 
-    /// The light of a bin that counts with `chance`, if SPADs are ready for it and more light makes it count more.
-    fn light(&self, chance: f64) -> f64 {
-        let counting = self.response.counting;
-        let fired = counting.fired_for(chance.min(0.999));
-        -(counting.spads as f64) * libm::log1p(-fired)
-    }
-
     /// The background to begin with, and the most that it may be: from the third of the bins with the fewest counts, because the
     /// median is too much where an echo is wide. Where SPADs are blind they say too little, which the fit finds out.
     fn background(&self, counts: &[f64], cycles: f64) -> [f64; 2] {
@@ -400,11 +395,11 @@ impl WalkCorrection {
         let few = sorted[sorted.len() / 3];
         // Where nothing counts, the background is some tenth of what would show.
         let begin = match few >= 1.0 {
-            true => self.light(few / cycles),
-            false => 0.1 * self.light(0.3 / cycles),
+            true => self.response.steady_light(few / cycles),
+            false => 0.1 * self.response.steady_light(0.3 / cycles),
         };
         // No count in a bin allows three.
-        [begin, self.light((few + 3.0) / cycles)]
+        [begin, self.response.steady_light((few + 3.0) / cycles)]
     }
 }
 

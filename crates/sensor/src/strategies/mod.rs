@@ -57,7 +57,7 @@ pub use photons::{
 pub use scenarios::{Scenario, scenarios, scenarios_of};
 pub use sensors::{sensors, sensors_of_every_engine};
 pub use silicon::{conditions, mismatches, silicon};
-pub use waveforms::{PropertyFailure, check_property, write_failing_case};
+pub use waveforms::{PropertyFailure, check_property, check_property_from, write_failing_case};
 
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -67,14 +67,17 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 /// # Panics
 /// If a strategy rejects thousands of values in a row.
 pub fn drawn<S: Strategy>(seed: u64, strategy: &S) -> S::Value {
-    let mut bytes = [0; 32];
-    bytes[..8].copy_from_slice(&seed.to_le_bytes());
-    let random = TestRng::from_seed(RngAlgorithm::ChaCha, &bytes);
     let config = Config {
         failure_persistence: None,
         ..Config::default()
     };
-    let mut runner = TestRunner::new_with_rng(config, random);
+    let mut runner = TestRunner::new_with_rng(config, seeded(seed));
     let tree = strategy.new_tree(&mut runner);
     tree.expect("few values are rejected").current()
+}
+
+fn seeded(seed: u64) -> TestRng {
+    let mut bytes = [0; 32];
+    bytes[..8].copy_from_slice(&seed.to_le_bytes());
+    TestRng::from_seed(RngAlgorithm::ChaCha, &bytes)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, Reason, TestCaseResult, TestError, TestRunner};
 
-use super::Scenario;
+use super::{Scenario, seeded};
 use crate::engine::waveform::{View, record};
 use crate::files::{InputError, create_folder};
 use crate::waves::WaveFormat;
@@ -40,7 +40,7 @@ pub enum PropertyFailure {
 
 /// Holds a property to so many scenarios. The smallest failing one is written to `folder` as [`write_failing_case`] does.
 ///
-/// Scenarios are new ones in each run, unless the environment has a PROPTEST_RNG_SEED.
+/// Scenarios are new ones in each run, unless the environment has a PROPTEST_RNG_SEED. [`check_property_from`] always draws the same ones.
 ///
 /// # Errors
 /// That the property does not hold, or is about too few of the scenarios.
@@ -50,14 +50,41 @@ pub fn check_property(
     property: impl Fn(&Scenario) -> TestCaseResult,
     folder: &Path,
 ) -> Result<(), PropertyFailure> {
-    let config = Config {
+    check_with(TestRunner::new(config(cases)), scenarios, property, folder)
+}
+
+/// The same, with the scenarios that a seed gives.
+///
+/// # Errors
+/// As [`check_property`].
+pub fn check_property_from(
+    seed: u64,
+    cases: u32,
+    scenarios: &impl Strategy<Value = Scenario>,
+    property: impl Fn(&Scenario) -> TestCaseResult,
+    folder: &Path,
+) -> Result<(), PropertyFailure> {
+    let runner = TestRunner::new_with_rng(config(cases), seeded(seed));
+    check_with(runner, scenarios, property, folder)
+}
+
+fn config(cases: u32) -> Config {
+    Config {
         cases,
         failure_persistence: None,
         // A sensor has some forty numbers, each of which takes a few steps.
         max_shrink_iters: 4096,
         ..Config::default()
-    };
-    let result = TestRunner::new(config).run(scenarios, |scenario| property(&scenario));
+    }
+}
+
+fn check_with(
+    mut runner: TestRunner,
+    scenarios: &impl Strategy<Value = Scenario>,
+    property: impl Fn(&Scenario) -> TestCaseResult,
+    folder: &Path,
+) -> Result<(), PropertyFailure> {
+    let result = runner.run(scenarios, |scenario| property(&scenario));
     let (reason, scenario) = match result {
         Ok(()) => return Ok(()),
         Err(TestError::Abort(reason)) => return Err(PropertyFailure::Rejects(reason)),

@@ -1,55 +1,247 @@
-//! Mean histograms of sensors other than ours, whose bins no dead time ties together, or only that a laser cycle counts once.
+//! Mean histograms of sensors other than ours: bins of any lengths, which count photons or SPADs that fire together.
 //!
 //! ```text
-//!   every photon   chance of bin i ∝ λᵢ                                     a count is a Poisson number
-//!   first photon   chance of bin i ∝ e^(−λ₀ − … − λᵢ₋₁)·(1 − e^(−λᵢ))       a laser cycle counts at most once, in any of the bins
+//!   every event   mean of bin i = Hᵢ                                 a count is a Poisson number
+//!   first event   mean of bin i = e^(−H₀ − … − Hᵢ₋₁)·(1 − e^(−Hᵢ))   a laser cycle counts at most once, in any of the bins
+//!   Hᵢ            events of bin i: its photons, or ∫ λ·(chance that a photon at t is the one that completes k SPADs) dt
 //! ```
 //!
-//! Chances are of laser cycles that are cut into many: with few counts in each, binomial counts of bins that are taken for independent have
-//! the variances of Poisson numbers. Those of first photons have no more, so that bounds are rather too long there.
+//! An event of k SPADs within τ comes with the photon whose SPAD is the k-th that had a photon in the last τ. The other SPADs had photons
+//! independently, so that the number of those is binomial. This is exact where every event counts and a SPAD may fire again at any time.
+//! Where only the first event counts, no event before says that there were fewer than k; that is all that is taken from it.
+//!
+//! Light may be given of a part of a laser cycle. With few counts in each part, binomial counts of bins that are taken for independent have
+//! the variances of Poisson numbers. Those of first events have no more, so that bounds are rather too long there.
+//!
+//! Bins of unequal lengths are equal ones on a bent axis: position i + ½ is the edge behind bin i, and time is linear in between. Times are
+//! in mean lengths of a bin.
 
 use super::{EchoLight, OfBins, PARAMETERS, Response};
 use crate::numerics::Dual;
 
-/// How a bin of another sensor counts.
+/// Steps to the time in which SPADs must fire together, and the most of them to a bin: chosen. Twice as many move no mean by 1 % of it.
+const STEPS_OF_WINDOW: f64 = 8.0;
+const MOST_STEPS: f64 = 64.0;
+
+/// SPADs that fire together.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::ranging) enum OtherBins {
-    /// Each photon.
-    EveryPhoton,
-    /// The first of `parts` laser cycles, as many as one is cut into.
-    FirstPhoton { parts: f64 },
+pub(in crate::ranging) struct FiringTogether {
+    /// How many, 1 or more.
+    pub(in crate::ranging) least: u32,
+    /// Within this time, mean bins.
+    pub(in crate::ranging) within_bins: f64,
+    /// Of so many, on which light comes evenly.
+    pub(in crate::ranging) of_spads: u32,
+}
+
+/// How the bins of another sensor count.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::ranging) struct OtherBins {
+    /// Where bins begin, and the last one ends, mean bins: from −½ to their number less ½.
+    pub(in crate::ranging) edges: Vec<f64>,
+    /// Photons of light that is known, in each bin and laser cycle; empty without.
+    pub(in crate::ranging) known: Vec<f64>,
+    /// What an event is, if it is not a photon.
+    pub(in crate::ranging) together: Option<FiringTogether>,
+    /// Whether a laser cycle counts its first event only.
+    pub(in crate::ranging) first_only: bool,
+    /// Parts that a laser cycle is cut into. Light is of a part, and so are chances.
+    pub(in crate::ranging) parts: f64,
 }
 
 impl OtherBins {
+    /// Edges of equal bins.
+    pub(in crate::ranging) fn equal_edges(bins: usize) -> Vec<f64> {
+        (0..=bins).map(|edge| edge as f64 - 0.5).collect()
+    }
+
+    /// The time of a position, and how long the bin about it is, mean bins.
+    pub(in crate::ranging) fn time(&self, position_bins: f64) -> (f64, f64) {
+        let last = self.edges.len() - 2;
+        let bin = ((position_bins + 0.5).max(0.0) as usize).min(last);
+        let length = self.edges[bin + 1] - self.edges[bin];
+        let within = position_bins + 0.5 - bin as f64;
+        (self.edges[bin] + within * length, length)
+    }
+
+    /// The position of a time, mean bins.
+    pub(in crate::ranging) fn position(&self, time_bins: f64) -> f64 {
+        let last = self.edges.len() - 2;
+        let begun = self.edges.partition_point(|&edge| edge <= time_bins);
+        let bin = begun.saturating_sub(1).min(last);
+        let length = self.edges[bin + 1] - self.edges[bin];
+        bin as f64 - 0.5 + (time_bins - self.edges[bin]) / length
+    }
+
+    /// The light, photons in a mean bin and part of a laser cycle, of which a mean bin counts with `chance`, if no event came before.
+    pub(in crate::ranging) fn steady_light(&self, chance: f64) -> f64 {
+        let events = if self.first_only {
+            -libm::log1p(-(chance * self.parts).min(0.999))
+        } else {
+            chance * self.parts
+        };
+        let Some(together) = self.together else {
+            return events / self.parts;
+        };
+        // Events grow with light as long as few SPADs have had a photon.
+        let rate = |photons: f64| {
+            let window = Dual::<0>::constant(photons * together.within_bins);
+            photons * together.completes(window, self.first_only).value
+        };
+        let most = f64::from(together.of_spads) / together.within_bins;
+        let (mut least, mut most) = (0.0, most);
+        for _ in 0..50 {
+            let middle = 0.5 * (least + most);
+            if rate(middle) < events {
+                least = middle;
+            } else {
+                most = middle;
+            }
+        }
+        least / self.parts
+    }
+
     /// The chance of every bin, with its slopes with the first K parameters.
     pub(super) fn chances<const K: usize>(
-        self,
+        &self,
         response: &Response,
         light: &EchoLight,
     ) -> OfBins<K> {
-        let edges: Vec<f64> = (0..=response.bins).map(|edge| edge as f64 - 0.5).collect();
-        let [until, by_place, by_width] = response.pulse(light).until_each(&edges);
-        let background = light.background_per_bin;
-        let mut before = Dual::ZERO;
-        let bin = |bin: usize| {
-            let growth = |row: &[f64]| row[bin + 1] - row[bin];
-            let signal = growth(&until);
-            let slopes: [f64; PARAMETERS] =
-                [growth(&by_place), signal, background, growth(&by_width)];
-            let photons = Dual {
-                value: signal + background,
-                slope: std::array::from_fn(|parameter| slopes[parameter]),
-            };
-            match self {
-                OtherBins::EveryPhoton => photons,
-                OtherBins::FirstPhoton { parts } => {
-                    let (hit, _) = (photons * parts).hits();
-                    let is_first = (before * -parts).exp();
-                    before += photons;
-                    is_first * hit * parts.recip()
-                }
+        let mut events_before = Dual::ZERO;
+        let parts = self.parts.recip();
+        let bin = |events: Dual<K>| {
+            if !self.first_only {
+                return events * parts;
             }
+            let (hit, _) = events.hits();
+            let is_first = (events_before * -1.0).exp();
+            events_before += events;
+            is_first * hit * parts
         };
-        (0..response.bins).map(bin).collect()
+        self.events(response, light).into_iter().map(bin).collect()
+    }
+
+    /// Events of each bin in a laser cycle of background and known light alone, in which none came before.
+    pub(in crate::ranging) fn dark_events(
+        &self,
+        response: &Response,
+        background_per_bin: f64,
+    ) -> Vec<f64> {
+        let dark = EchoLight {
+            position_bins: 0.0,
+            signal: 0.0,
+            background_per_bin,
+            sigma_bins: response.pulse_sigma_bins,
+        };
+        let events = self.events::<0>(response, &dark);
+        events.into_iter().map(|events| events.value).collect()
+    }
+
+    /// Events of each bin in a laser cycle in which none came before.
+    fn events<const K: usize>(&self, response: &Response, light: &EchoLight) -> Vec<Dual<K>> {
+        let (place, length) = self.time(light.position_bins);
+        let pulse = response.pulse(&EchoLight {
+            position_bins: place,
+            ..*light
+        });
+        // Photons until some times, which rise.
+        let until = |times: &[f64]| -> Vec<Dual<K>> {
+            let [signal, by_place, by_width] = pulse.until_each(times);
+            let photons = |(at, &time): (usize, &f64)| {
+                let background = light.background_per_bin * (time + 0.5);
+                let slopes: [f64; PARAMETERS] =
+                    [by_place[at] * length, signal[at], background, by_width[at]];
+                let photons = Dual {
+                    value: signal[at] + background,
+                    slope: std::array::from_fn(|parameter| slopes[parameter]),
+                };
+                photons * self.parts + Dual::constant(self.known_until(time))
+            };
+            times.iter().enumerate().map(photons).collect()
+        };
+        let Some(together) = self.together else {
+            let until = until(&self.edges);
+            return until.windows(2).map(|ends| ends[1] - ends[0]).collect();
+        };
+        let mut steps = vec![self.edges[0]];
+        let mut first_steps = vec![0];
+        for ends in self.edges.windows(2) {
+            let length = ends[1] - ends[0];
+            let wanted = STEPS_OF_WINDOW * length / together.within_bins;
+            let count = wanted.ceil().clamp(2.0, MOST_STEPS) as usize;
+            let step = |n: usize| ends[0] + length * n as f64 / count as f64;
+            steps.extend((1..count).map(step));
+            steps.push(ends[1]);
+            first_steps.push(steps.len() - 1);
+        }
+        let middles: Vec<f64> = steps
+            .windows(2)
+            .map(|ends| 0.5 * (ends[0] + ends[1]))
+            .collect();
+        let begins: Vec<f64> = middles
+            .iter()
+            .map(|time| time - together.within_bins)
+            .collect();
+        let [until_step, until_middle, until_begin] = [&steps, &middles, &begins].map(|t| until(t));
+        let of_step = |step: usize| {
+            let photons = until_step[step + 1] - until_step[step];
+            let window = until_middle[step] - until_begin[step];
+            photons * together.completes(window, self.first_only)
+        };
+        let of_bin = |ends: &[usize]| {
+            let mut events = Dual::ZERO;
+            (ends[0]..ends[1]).for_each(|step| events += of_step(step));
+            events
+        };
+        first_steps.windows(2).map(of_bin).collect()
+    }
+
+    /// Known photons of a laser cycle until a time.
+    fn known_until(&self, time: f64) -> f64 {
+        let mut sum = 0.0;
+        for (ends, photons) in self.edges.windows(2).zip(&self.known) {
+            if time <= ends[0] {
+                break;
+            }
+            let share = ((time - ends[0]) / (ends[1] - ends[0])).min(1.0);
+            sum += photons * share;
+        }
+        sum
+    }
+}
+
+impl FiringTogether {
+    /// The chance that a photon's SPAD is the one that was missing, where `window` photons came within the time before it; if
+    /// `none_before`, given that too few had a photon.
+    fn completes<const K: usize>(&self, window: Dual<K>, none_before: bool) -> Dual<K> {
+        let spads = f64::from(self.of_spads);
+        let mean = window.value.max(0.0) / spads;
+        let (quiet, fired) = (libm::exp(-mean), -libm::expm1(-mean));
+        // So many of the other SPADs had a photon, and the rest with the photon's own had none.
+        let (others, still) = (self.least - 1, self.of_spads + 1 - self.least);
+        let of_others = Self::exactly(self.of_spads - 1, others, (fired, quiet));
+        let chance = of_others * quiet;
+        let of_fired = if others > 0 && fired > 0.0 {
+            f64::from(others) * quiet / fired
+        } else {
+            0.0
+        };
+        let slope = chance * (of_fired - f64::from(still)) / spads;
+        let completes = window.chain(chance, slope);
+        if !none_before {
+            return completes;
+        }
+        let too_few = (0..self.least).map(|n| Self::exactly(self.of_spads, n, (fired, quiet)));
+        // It shrinks as often as one SPAD more fires than may.
+        let too_few = window.chain(too_few.sum(), -chance);
+        completes * too_few.recip()
+    }
+
+    /// The chance that so many of some SPADs had a photon, each with a chance of its own.
+    fn exactly(spads: u32, number: u32, (fired, quiet): (f64, f64)) -> f64 {
+        let ways = (0..number).fold(1.0, |ways, n| {
+            ways * f64::from(spads - n) / f64::from(n + 1)
+        });
+        ways * fired.powi(number as i32) * quiet.powi((spads - number) as i32)
     }
 }

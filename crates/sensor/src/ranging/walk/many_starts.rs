@@ -139,14 +139,18 @@ impl WalkCorrection {
         if counting.event_type != EventType::Greater {
             return None;
         }
-        let light = |&counts: &f64| self.light((counts / likelihood.cycles).min(0.99)) - background;
+        let light = |&counts: &f64| {
+            self.response
+                .steady_light((counts / likelihood.cycles).min(0.99))
+                - background
+        };
         let bins = likelihood.counts.iter().map(light);
         let bins: Vec<f64> = bins.collect();
         let most = bins.iter().copied().fold(0.0, f64::max);
         let bin = bins.iter().position(|&photons| photons > 0.2 * most)?;
         let is_full = likelihood.counts[bin] > 0.98 * likelihood.cycles;
         if is_full && bin > 0 && self.has_short_pulses() {
-            let least = self.light(0.5 / likelihood.cycles);
+            let least = self.response.steady_light(0.5 / likelihood.cycles);
             return Some((bin - 1, bins[bin - 1].max(least)));
         }
         Some((bin, bins[bin]))

@@ -183,7 +183,7 @@ fn a_rising_edge_is_the_first_bin_with_a_fifth_of_the_most_light() {
     );
     assert_eq!(edge([10.0; 6]), None);
     // The bin before it tells where a short pulse begins.
-    let mut short = walk;
+    let mut short = walk.clone();
     short.response.pulse_sigma_bins = 0.1;
     for (before, expected) in [(10.0, photons(0.5)), (30.0, photons(30.0) - photons(10.0))] {
         let counts = [10.0, before, 1000.0, 1000.0, 10.0, 10.0];
@@ -264,7 +264,7 @@ fn many_starts_find_strong_light() {
             };
             let response = Response::new(&config, 1.0 / config.clk_hz, Time::from_ps(1_911));
             let walk = WalkCorrection {
-                response,
+                response: response.clone(),
                 laser_cycles: CYCLES,
             };
             let light = EchoLight {

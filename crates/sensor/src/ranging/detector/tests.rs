@@ -1,0 +1,430 @@
+//! Detectors are held to histograms that are drawn photon by photon, and SPAD by SPAD.
+
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+use super::*;
+
+const BINS: usize = 64;
+const LASER_CYCLES: u32 = 2000;
+
+fn detector(counted: Counted) -> Detector {
+    Detector {
+        edges_s: Detector::equal_edges_s(BINS, 20e-9, 1e-9),
+        pulse_sigma_s: 0.8e-9,
+        counted,
+        laser_cycles: Some(LASER_CYCLES),
+        coincidence: None,
+        most_counts: None,
+        crosstalk: Vec::new(),
+    }
+}
+
+/// Bins whose lengths go from a half to one and a half of the mean and back.
+fn unequal(counted: Counted) -> Detector {
+    let mut edges_s = vec![20e-9];
+    for bin in 0..BINS {
+        let length_s = 1e-9 * (1.0 + 0.5 * libm::sin(bin as f64 * 0.9));
+        edges_s.push(edges_s[bin] + length_s);
+    }
+    Detector {
+        edges_s,
+        ..detector(counted)
+    }
+}
+
+fn together(counted: Counted, spads: u32) -> Detector {
+    let coincidence = Coincidence {
+        spads,
+        within_s: 4e-9,
+        of: 16,
+    };
+    Detector {
+        coincidence: Some(coincidence),
+        ..detector(counted)
+    }
+}
+
+/// Light in photons of a laser cycle.
+#[derive(Debug, Clone, Copy)]
+struct Light {
+    /// Arrival of the echo after the centre of the pulse has left, s.
+    place_s: f64,
+    signal: f64,
+    background: f64,
+    /// A cover glass whose light comes at 24 ns.
+    glass: f64,
+}
+
+const GLASS_S: f64 = 24e-9;
+
+impl Light {
+    fn new(place_s: f64, signal: f64, background: f64) -> Self {
+        Light {
+            place_s,
+            signal,
+            background,
+            glass: 0.0,
+        }
+    }
+
+    fn depth_m(&self) -> f64 {
+        0.5 * SPEED_OF_LIGHT_M_PER_S * self.place_s
+    }
+
+    fn of_histogram(&self) -> SurfaceLight {
+        let cycles = f64::from(LASER_CYCLES);
+        SurfaceLight {
+            depth_m: self.depth_m(),
+            photons: self.signal * cycles,
+            background: self.background * cycles,
+        }
+    }
+}
+
+/// A number of standard normal distribution: the sum of twelve even ones, less six.
+fn normal(random: &mut StdRng) -> f64 {
+    (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
+}
+
+fn poisson(random: &mut StdRng, mean: f64) -> u32 {
+    let (mut number, mut product) = (0, random.random::<f64>());
+    while product > libm::exp(-mean) {
+        product *= random.random::<f64>();
+        number += 1;
+    }
+    number
+}
+
+fn histogram(random: &mut StdRng, detector: &Detector, light: &Light) -> Vec<u32> {
+    let bins = detector.bins();
+    let mut counts = vec![0; bins];
+    let (first_s, end_s) = (detector.edges_s[0], detector.edges_s[bins]);
+    let Coincidence {
+        spads,
+        within_s,
+        of,
+    } = detector.coincidence.unwrap_or(Coincidence {
+        spads: 1,
+        within_s: 0.0,
+        of: 1,
+    });
+    // Background comes before the first bin, too.
+    let before_s = 2.0 * within_s;
+    let background = light.background * (1.0 + before_s / (end_s - first_s));
+    for _ in 0..LASER_CYCLES {
+        let mut times = Vec::new();
+        for (place_s, mean) in [(light.place_s, light.signal), (GLASS_S, light.glass)] {
+            for _ in 0..poisson(random, mean) {
+                times.push(place_s + detector.pulse_sigma_s * normal(random));
+            }
+        }
+        for _ in 0..poisson(random, background) {
+            let share = random.random::<f64>();
+            times.push(first_s - before_s + share * (end_s - first_s + before_s));
+        }
+        times.sort_by(f64::total_cmp);
+        let mut last_s = vec![f64::NEG_INFINITY; of as usize];
+        for time in times {
+            let is_high = |last_s: &&f64| time - **last_s < within_s;
+            let spad = random.random_range(0..of as usize);
+            let high = last_s.iter().filter(is_high).count();
+            let is_event = !is_high(&&last_s[spad]) && high + 1 == spads as usize;
+            last_s[spad] = time;
+            if !is_event {
+                continue;
+            }
+            let bin = detector.edges_s.partition_point(|&edge_s| edge_s <= time);
+            // An event before the first bin or after the last one is none that the detector sees.
+            if (1..=bins).contains(&bin) {
+                counts[bin - 1] += 1;
+                if detector.counted == Counted::First {
+                    break;
+                }
+            }
+        }
+    }
+    let most = detector.most_counts.unwrap_or(u32::MAX);
+    counts.iter().map(|&count| count.min(most)).collect()
+}
+
+/// How depths scatter about the truth, all in bounds: the root of the mean square, the mean, and the greatest.
+fn scatter(detector: &Detector, seed: u64, repeats: usize, light: &Light) -> [f64; 3] {
+    let mut random = StdRng::seed_from_u64(seed);
+    let (mut squares, mut sum, mut most) = (0.0, 0.0, 0.0_f64);
+    for repeat in 0..repeats {
+        let light = Light {
+            place_s: light.place_s + 0.37e-9 * repeat as f64 % 10e-9,
+            ..*light
+        };
+        let counts = histogram(&mut random, detector, &light);
+        detector.check(&counts).unwrap();
+        let found = detector.returns(&counts, &DepthOptions::default());
+        let first = found.unwrap_or_else(|why| panic!("{light:?}: {why}"))[0];
+        let bound_m = first
+            .bound_m
+            .unwrap_or_else(|| panic!("{light:?}: {first:?}"));
+        let off = (first.depth_m - light.depth_m()) / bound_m;
+        squares += off * off;
+        sum += off;
+        most = most.max(off.abs());
+    }
+    let all = repeats as f64;
+    [(squares / all).sqrt(), sum / all, most]
+}
+
+fn assert_within_bounds(detector: &Detector, seed: u64, light: &Light) {
+    const REPEATS: usize = 40;
+    let [rms, mean, most] = scatter(detector, seed, REPEATS, light);
+    let is_right = rms < 1.4 && mean.abs() < 4.0 / (REPEATS as f64).sqrt() && most < 5.0;
+    assert!(is_right, "{detector:?} {light:?}: {rms} {mean} {most}");
+}
+
+#[test]
+fn depths_of_photons_drawn_one_by_one_keep_their_bounds() {
+    for counted in [Counted::Every, Counted::First] {
+        for detector in [detector(counted), unequal(counted)] {
+            for (signal, background) in [(0.05, 0.2), (0.3, 0.5), (1.5, 0.5)] {
+                assert_within_bounds(&detector, 1, &Light::new(45e-9, signal, background));
+            }
+        }
+    }
+}
+
+#[test]
+fn depths_of_spads_that_fire_together_keep_their_bounds() {
+    for counted in [Counted::Every, Counted::First] {
+        for (spads, signal, background) in
+            [(2, 0.5, 0.5), (2, 1.5, 2.0), (2, 4.0, 1.0), (3, 4.0, 4.0)]
+        {
+            let light = Light::new(45e-9, signal, background);
+            assert_within_bounds(&together(counted, spads), 2, &light);
+        }
+    }
+}
+
+#[test]
+fn a_surface_beside_a_cover_glass_keeps_its_bound() {
+    for counted in [Counted::Every, Counted::First] {
+        for mut detector in [detector(counted), unequal(counted)] {
+            let glass = Light::new(GLASS_S, 0.3, 0.0);
+            let every = Detector {
+                counted: Counted::Every,
+                ..detector.clone()
+            };
+            detector.crosstalk = every.expected(&glass.of_histogram());
+            for place_s in [27e-9, 45e-9] {
+                let light = Light {
+                    glass: 0.3,
+                    ..Light::new(place_s, 0.15, 0.3)
+                };
+                assert_within_bounds(&detector, 3, &light);
+            }
+            let alone = Light {
+                glass: 0.3,
+                ..Light::new(45e-9, 0.0, 0.3)
+            };
+            let mut random = StdRng::seed_from_u64(4);
+            let options = DepthOptions::default();
+            for _ in 0..50 {
+                let counts = histogram(&mut random, &detector, &alone);
+                let none = detector.returns(&counts, &options);
+                assert_eq!(none, Err(NoReturn::NoSignificantPeak));
+            }
+        }
+    }
+}
+
+#[test]
+fn bins_that_stop_have_no_bound_that_is_too_short() {
+    let stops = Detector {
+        most_counts: Some(255),
+        ..detector(Counted::Every)
+    };
+    let mut random = StdRng::seed_from_u64(5);
+    let (mut saturated, mut depths) = (0, 0);
+    for repeat in 0..40 {
+        let light = Light::new(45e-9 + 0.37e-9 * f64::from(repeat), 1.5, 0.5);
+        let counts = histogram(&mut random, &stops, &light);
+        match stops.returns(&counts, &DepthOptions::default()) {
+            Err(NoReturn::Saturated) => saturated += 1,
+            Ok(found) => {
+                let off_m = (found[0].depth_m - light.depth_m()).abs();
+                let bound_m = found[0].bound_m.unwrap_or(f64::INFINITY);
+                assert!(off_m < 5.0 * bound_m, "{light:?} {found:?}");
+                depths += 1;
+            }
+            Err(why) => panic!("{light:?}: {why}"),
+        }
+    }
+    assert!(saturated > 0, "{saturated} {depths}");
+    let mut more = vec![0; BINS];
+    more[3] = 256;
+    assert!(stops.check(&more).is_err());
+}
+
+#[test]
+fn background_alone_has_no_return_and_impossible_counts_are_refused() {
+    let mut random = StdRng::seed_from_u64(6);
+    let options = DepthOptions::default();
+    for counted in [Counted::Every, Counted::First] {
+        for detector in [detector(counted), unequal(counted), together(counted, 2)] {
+            for _ in 0..50 {
+                let dark = histogram(&mut random, &detector, &Light::new(40e-9, 0.0, 0.8));
+                let none = detector.returns(&dark, &options);
+                assert_eq!(none, Err(NoReturn::NoSignificantPeak), "{detector:?}");
+            }
+        }
+    }
+    let mut many = vec![0; BINS];
+    many[3] = LASER_CYCLES + 1;
+    assert!(detector(Counted::Every).check(&many).is_ok());
+    assert!(detector(Counted::First).check(&many).is_err());
+}
+
+/// Detectors, and light whose counts are to agree with their means.
+fn known_means() -> Vec<(Detector, Light)> {
+    let mut cases = Vec::new();
+    for counted in [Counted::Every, Counted::First] {
+        let light = Light::new(45.2e-9, 0.1, 0.2);
+        cases.push((detector(counted), light));
+        cases.push((unequal(counted), light));
+        cases.push((together(counted, 2), Light::new(45.2e-9, 1.0, 1.0)));
+        cases.push((together(counted, 3), Light::new(45.2e-9, 4.0, 4.0)));
+    }
+    cases
+}
+
+#[test]
+fn counts_drawn_photon_by_photon_agree_and_those_of_other_light_do_not() {
+    let mut random = StdRng::seed_from_u64(7);
+    for (detector, light) in known_means() {
+        let (mut low, mut high) = (0, 0);
+        const REPEATS: usize = 100;
+        for repeat in 0..REPEATS {
+            let light = Light {
+                place_s: light.place_s + 0.29e-9 * repeat as f64 % 20e-9,
+                ..light
+            };
+            let counts = histogram(&mut random, &detector, &light);
+            let expected = detector.expected(&light.of_histogram());
+            let found = detector.agreement(&counts, &expected);
+            low += usize::from(found.p < 0.05);
+            high += usize::from(found.p > 0.95);
+            // A bin too late, and twice as much background.
+            let place_s = light.place_s + 1e-9;
+            let background = 2.0 * light.background;
+            for other in [
+                Light { place_s, ..light },
+                Light {
+                    background,
+                    ..light
+                },
+            ] {
+                let expected = detector.expected(&other.of_histogram());
+                let agreement = detector.agreement(&counts, &expected);
+                assert!(agreement.p < 1e-3, "{detector:?} {other:?} {agreement:?}");
+            }
+        }
+        // Five each are expected.
+        let is_right = (0..=13).contains(&low) && (0..=16).contains(&high);
+        assert!(is_right, "{detector:?}: {low} {high}");
+    }
+}
+
+/// Of the first event of SPADs that fire together the mean takes that too few fired before, and not when. In this light, some events in each
+/// laser cycle, a mean is off by 0.9 of the noise of one histogram.
+#[test]
+fn means_of_first_events_are_right_to_a_part_of_their_noise() {
+    let mut random = StdRng::seed_from_u64(8);
+    const HISTOGRAMS: u32 = 50;
+    for (detector, light) in [
+        (together(Counted::First, 2), Light::new(45.2e-9, 3.0, 6.0)),
+        (together(Counted::First, 3), Light::new(45.2e-9, 6.0, 12.0)),
+        (together(Counted::Every, 2), Light::new(45.2e-9, 3.0, 6.0)),
+    ] {
+        let mut sums = vec![0; BINS];
+        for _ in 0..HISTOGRAMS {
+            let counts = histogram(&mut random, &detector, &light);
+            sums.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
+        }
+        let expected = detector.expected(&light.of_histogram());
+        let mut worst: f64 = 0.0;
+        for (&sum, mean) in sums.iter().zip(&expected) {
+            let off = f64::from(sum) / f64::from(HISTOGRAMS) - mean;
+            worst = worst.max(off.abs() / (mean + 1.0).sqrt());
+        }
+        assert!(worst < 1.2, "{detector:?} {light:?}: {worst}");
+    }
+}
+
+#[test]
+fn first_photons_are_no_more_than_laser_cycles() {
+    let first = detector(Counted::First);
+    let light = Light::new(50.5e-9, 5.0, 8.0).of_histogram();
+    let all: f64 = first.expected(&light).iter().sum();
+    assert!(all < f64::from(LASER_CYCLES) && all > 0.999 * f64::from(LASER_CYCLES));
+    let same = detector(Counted::Every).expected(&light);
+    assert!((same.iter().sum::<f64>() / f64::from(LASER_CYCLES) - 13.0).abs() < 1e-6);
+    assert_eq!(same.len(), BINS);
+}
+
+#[test]
+fn counts_where_none_can_be_do_not_agree() {
+    let every = detector(Counted::Every);
+    let mut counts = vec![0; BINS];
+    assert_eq!(every.agreement(&counts, &[0.0; BINS]).p, 1.0);
+    counts[4] = 1;
+    assert_eq!(every.agreement(&counts, &[0.0; BINS]).p, 0.0);
+}
+
+#[test]
+fn a_glass_is_found_from_captures_without_a_target_and_from_those_with_one() {
+    let mut random = StdRng::seed_from_u64(9);
+    const CAPTURES: u32 = 6;
+    let sum_of = |random: &mut StdRng, detector: &Detector, light: &Light| {
+        let mut sums = vec![0; BINS];
+        for _ in 0..CAPTURES {
+            let counts = histogram(random, detector, light);
+            sums.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
+        }
+        sums
+    };
+    for counted in [Counted::Every, Counted::First] {
+        // Bins that begin before the glass, whose light comes at nearly no distance.
+        let near = detector(counted).later(-23.7e-9);
+        let moved = |place_s: f64| place_s - 23.7e-9;
+        let every = Detector {
+            counted: Counted::Every,
+            ..near.clone()
+        };
+        let glass = Light::new(moved(GLASS_S), 0.4, 0.0);
+        let truth = every.expected(&glass.of_histogram());
+        let alone = Light {
+            signal: 0.4,
+            background: 0.5,
+            ..glass
+        };
+        let measured = near.measured_crosstalk(&sum_of(&mut random, &near, &alone), CAPTURES);
+        let sum: f64 = measured.iter().sum();
+        let all: f64 = truth.iter().sum();
+        assert!((sum / all - 1.0).abs() < 0.1, "{sum} {all}");
+        let none = Light::new(moved(45e-9), 0.0, 0.5);
+        assert!(
+            near.measured_crosstalk(&sum_of(&mut random, &near, &none), CAPTURES)
+                .is_empty()
+        );
+        // A target beside it.
+        let mut sums = sum_of(&mut random, &near, &alone);
+        let target = Light::new(moved(45e-9), 0.5, 0.0);
+        if counted == Counted::Every {
+            let more = sum_of(&mut random, &near, &target);
+            sums.iter_mut().zip(more).for_each(|(sum, n)| *sum += n);
+        }
+        let fitted = near.fitted_crosstalk(&sums, CAPTURES);
+        let sum: f64 = fitted.iter().sum();
+        assert!((sum / all - 1.0).abs() < 0.1, "{sum} {all}");
+        let far = sum_of(&mut random, &near, &target);
+        assert!(near.fitted_crosstalk(&far, CAPTURES).is_empty());
+    }
+}
