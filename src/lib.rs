@@ -58,9 +58,8 @@ pub mod sweep;
 pub mod system;
 pub mod testbenches;
 
-pub use guided_dtof_light::{
-    files, guide, numerics, photon, scene, settings, stereo, theory, units,
-};
+pub use guided_dtof_light::{files, numerics, photon, settings, theory, units};
+pub use guided_dtof_scene::{guide, scene, stereo};
 #[cfg(feature = "proptest")]
 pub use guided_dtof_sensor::strategies;
 pub use guided_dtof_sensor::{

@@ -26,7 +26,10 @@ const MEBIBYTE: usize = 1 << 20;
 const MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// Reads over a byte order mark at the beginning of a file.
-pub(crate) fn skip_mark(reader: &mut impl BufRead) -> io::Result<()> {
+///
+/// # Errors
+/// When the reader fails.
+pub fn skip_mark(reader: &mut impl BufRead) -> io::Result<()> {
     if reader.fill_buf()?.starts_with(MARK) {
         reader.consume(MARK.len());
     }

@@ -210,7 +210,6 @@ mod tests {
     use serde::de::DeserializeOwned;
 
     use super::*;
-    use crate::scene::DVec3;
 
     fn toml<T: DeserializeOwned>(text: &str) -> String {
         let read = toml::from_str::<BTreeMap<String, T>>(&format!("x = {text}"));
@@ -281,10 +280,6 @@ mod tests {
             (
                 toml::<[f64; 2]>("[1]"),
                 "a list of 1 is impossible; give a list of 2".into(),
-            ),
-            (
-                toml::<DVec3>("[1, 2]"),
-                "a list of 2 is impossible; give a list of 3 numbers".into(),
             ),
             (
                 toml::<Word>("3"),

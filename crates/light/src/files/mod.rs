@@ -38,8 +38,10 @@ pub use guarded::{
 };
 pub use histograms::{HistogramFormat, Histograms, ZoneCounts};
 pub use input::Lines;
-pub use input::{LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, too_long};
-pub(crate) use input::{MOST_TOML_BYTES, skip_mark};
+pub(crate) use input::MOST_TOML_BYTES;
+pub use input::{
+    LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, skip_mark, too_long,
+};
 pub use interruption::clean_up_when_interrupted;
 pub use journal::{Journal, JournalReader, is_journal, journal_line};
 pub use misfit::Misfit;

@@ -59,7 +59,7 @@ impl Raster {
     ///
     /// # Errors
     /// As [`Raster::read_map`].
-    pub(crate) fn read_numbers(
+    pub fn read_numbers(
         path: &Path,
         unit: Option<f64>,
         unit_key: &str,
@@ -117,8 +117,9 @@ impl Raster {
         read.map_err(complain)
     }
 
-    /// The value at a pixel.
-    pub(crate) fn at(&self, row: usize, col: usize) -> f32 {
+    /// The value at a pixel, row 0 at the top.
+    #[inline]
+    pub fn at(&self, row: usize, col: usize) -> f32 {
         self.values[row * self.width + col]
     }
 }

@@ -9,7 +9,8 @@ mod quadrature;
 mod special;
 
 pub use dual::Dual;
-pub(crate) use quadrature::{gauss_legendre, integrate};
+pub(crate) use quadrature::gauss_legendre;
+pub use quadrature::integrate;
 pub(crate) use special::erfcx;
 pub(crate) use special::ln_exprel_neg;
 pub(crate) use special::ln_sum_exp;

@@ -46,7 +46,7 @@ pub(crate) fn gauss_legendre(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 
 ///
 /// A panel is also good when its own halves agree with it to ten times `tolerance`; that must not be less than
 /// the rounding noise of `f`, or every panel is halved for nothing. Put a break at every kink and near every narrow peak; between two of them `f` should be smooth.
-pub(crate) fn integrate(f: impl Fn(f64) -> f64, breaks: &[f64], tolerance: f64) -> f64 {
+pub fn integrate(f: impl Fn(f64) -> f64, breaks: &[f64], tolerance: f64) -> f64 {
     let panels = || breaks.windows(2).map(|p| (p[0], p[1]));
     let whole: Vec<f64> = panels().map(|(a, b)| gauss_legendre(&f, a, b)).collect();
     let size: f64 = whole.iter().map(|s| s.abs()).sum();

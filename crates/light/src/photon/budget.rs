@@ -59,11 +59,20 @@ words! {
 impl Spot {
     /// Share of the laser's power that falls on the area on the target of one pixel with this pitch in x and y, in any unit (Eq. 7
     /// and 8 times Eq. 11).
-    pub(crate) fn share_per_pixel(self, rows: u32, cols: u32, [x, y]: [f64; 2]) -> f64 {
+    pub fn share_per_pixel(self, rows: u32, cols: u32, [x, y]: [f64; 2]) -> f64 {
         let (rows, cols) = (f64::from(rows), f64::from(cols));
         match self {
             Spot::Rectangle => 1.0 / (rows * cols),
             Spot::Round => 4.0 * x * y / (PI * ((rows * y).powi(2) + (cols * x).powi(2))),
+        }
+    }
+
+    /// Whether it lights a point this far from its middle in x and y, where the projected sensor reaches `half_x` and `half_y`, all in
+    /// the same unit.
+    pub fn lights(self, [x, y]: [f64; 2], [half_x, half_y]: [f64; 2]) -> bool {
+        match self {
+            Spot::Rectangle => x.abs() <= half_x && y.abs() <= half_y,
+            Spot::Round => libm::hypot(x, y) <= libm::hypot(half_x, half_y),
         }
     }
 }
@@ -122,13 +131,13 @@ impl PhotonBudget {
 
     /// Detected photons of one macropixel where each square metre that it sees, if white, has got this energy of the laser's
     /// wavelength: as Eq. 16, for a pulse.
-    pub(crate) fn photons_of_exposure(&self, exposure_j_m2: f64) -> f64 {
+    pub fn photons_of_exposure(&self, exposure_j_m2: f64) -> f64 {
         let etendue_m2 = self.solid_angle_sr() * (self.lens_diameter_m / 2.0).powi(2);
         self.counts_per_joule(1.0) * exposure_j_m2 * etendue_m2
     }
 
     /// Detected photons of what falls on the lens, J/m², all of which goes into one macropixel.
-    pub(crate) fn photons_through_lens(&self, exposure_j_m2: f64) -> f64 {
+    pub fn photons_through_lens(&self, exposure_j_m2: f64) -> f64 {
         let aperture_m2 = PI * (self.lens_diameter_m / 2.0).powi(2);
         self.counts_per_joule(1.0) / self.convention.factor() * exposure_j_m2 * aperture_m2
     }

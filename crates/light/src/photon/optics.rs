@@ -71,7 +71,7 @@ impl Filter {
     }
 
     /// Transmission at `wavelength_nm`, 0 to 1.
-    pub(crate) fn transmission(&self, wavelength_nm: f64) -> f64 {
+    pub fn transmission(&self, wavelength_nm: f64) -> f64 {
         // In half widths: every shape has fallen to 1/2 at x = 1.
         let x = 2.0 * (wavelength_nm - self.centre_nm).abs() / self.fwhm_nm;
         match self.shape {
@@ -85,7 +85,7 @@ impl Filter {
 
     /// Share that passes of a Gaussian line of this width (full, at half maximum, > 0): the overlap of two Gaussians, or of a Gaussian and
     /// a top hat; `None` for shapes without such a closed form.
-    pub(crate) fn transmission_of(&self, wavelength_nm: f64, line_fwhm_nm: f64) -> Option<f64> {
+    pub fn transmission_of(&self, wavelength_nm: f64, line_fwhm_nm: f64) -> Option<f64> {
         let off_nm = wavelength_nm - self.centre_nm;
         match self.shape {
             FilterShape::Gaussian => {
@@ -103,7 +103,7 @@ impl Filter {
     }
 
     /// Wavelengths outside of which the transmission is nothing (below 10⁻³⁰), nm.
-    pub(crate) fn passband_nm(&self) -> (f64, f64) {
+    pub fn passband_nm(&self) -> (f64, f64) {
         let half_widths = match self.shape {
             FilterShape::TopHat => 1.0,
             FilterShape::Gaussian => 10.0,

@@ -80,7 +80,7 @@ impl PulseShape {
     }
 
     /// Variance of the times of its photons, fs².
-    pub(crate) fn variance_fs2(&self) -> f64 {
+    pub fn variance_fs2(&self) -> f64 {
         let (mean, square) = self.moments();
         let step_fs = self.step.as_fs() as f64;
         (square - mean * mean).max(0.0) * step_fs * step_fs

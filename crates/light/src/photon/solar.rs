@@ -16,7 +16,7 @@ use crate::numerics::integrate;
 pub const FULL_SUN_KLUX: f64 = 100.0;
 
 /// The reference spectrum: (wavelength nm, global tilt irradiance W/m²/nm), ascending, 280 to 4000 nm.
-pub(crate) fn spectrum() -> &'static [(f64, f64)] {
+pub fn spectrum() -> &'static [(f64, f64)] {
     static SPECTRUM: OnceLock<Vec<(f64, f64)>> = OnceLock::new();
     SPECTRUM.get_or_init(|| {
         include_str!("astm_g173.csv")
@@ -28,7 +28,7 @@ pub(crate) fn spectrum() -> &'static [(f64, f64)] {
 }
 
 /// Spectral irradiance at `wavelength_nm`, W/m²/nm; zero outside the table.
-pub(crate) fn spectral_irradiance(wavelength_nm: f64) -> f64 {
+pub fn spectral_irradiance(wavelength_nm: f64) -> f64 {
     let table = spectrum();
     let right = table.partition_point(|&(nm, _)| nm < wavelength_nm);
     match (

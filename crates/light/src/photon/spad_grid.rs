@@ -49,12 +49,12 @@ impl SpadGrid {
     }
 
     /// Rows.
-    pub(crate) const fn rows(self) -> usize {
+    pub const fn rows(self) -> usize {
         1 << self.row_bits
     }
 
     /// Columns.
-    pub(crate) const fn cols(self) -> usize {
+    pub const fn cols(self) -> usize {
         1 << self.col_bits
     }
 

@@ -29,7 +29,8 @@ pub struct Fault {
 }
 
 impl Fault {
-    pub(crate) fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
+    /// A fault of the value at `path`; see its fields.
+    pub fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
         let (path, message) = (path.into(), message.into());
         Fault { path, message }
     }
@@ -103,7 +104,7 @@ impl Document {
     }
 
     /// Whether there is no value at all.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.table.is_empty()
     }
 
@@ -242,7 +243,7 @@ impl Document {
     }
 
     /// A complaint about the value at `path`.
-    pub(crate) fn refuse(&self, path: &str, message: String) -> InputError {
+    pub fn refuse(&self, path: &str, message: String) -> InputError {
         let fault = Fault::new(path, message);
         self.complain(vec![fault]).expect_err("there is one fault")
     }

@@ -18,7 +18,8 @@ pub struct Section {
 }
 
 impl Section {
-    pub(crate) const fn new(name: &'static str, what: &'static str, keys: &'static [Key]) -> Self {
+    /// A section; see its fields.
+    pub const fn new(name: &'static str, what: &'static str, keys: &'static [Key]) -> Self {
         Section { name, what, keys }
     }
 }

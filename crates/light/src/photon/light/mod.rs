@@ -279,7 +279,7 @@ impl PixelLight {
     }
 
     /// Whether it is one echo at most and constant background, the same on all SPADs.
-    pub(crate) fn is_plain(&self) -> bool {
+    pub fn is_plain(&self) -> bool {
         self.later.is_empty()
             && self.first.further.is_empty()
             && self.first.profile.is_none()

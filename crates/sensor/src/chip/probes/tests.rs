@@ -167,6 +167,7 @@ fn nobody_else_names_an_inner_net() {
     for (folder, names) in [
         ("src", &inner),
         ("crates/light/src", &inner),
+        ("crates/scene/src", &inner),
         ("crates/sensor/src", &inner),
         ("benches", &inner),
         ("examples", &inner),

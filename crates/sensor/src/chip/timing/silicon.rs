@@ -163,7 +163,12 @@ mod tests {
     fn one_place_says_which_library_chips_are_made_of() {
         let mut found = Vec::new();
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        for folder in ["src", "crates/light/src", "crates/sensor/src"] {
+        for folder in [
+            "src",
+            "crates/light/src",
+            "crates/scene/src",
+            "crates/sensor/src",
+        ] {
             users(&root.join(folder), &mut found);
         }
         assert_eq!(found.len(), 1, "{found:?}");

@@ -18,7 +18,6 @@ use super::cast::Stage;
 use super::daylight::ABOVE_M;
 use super::settings::Scene;
 use super::vector::Ray;
-use crate::photon::Spot;
 
 /// How much before a surface light must have come, m, not to be stopped before it.
 const THERE_M: f64 = 1e-3;
@@ -46,16 +45,13 @@ impl Scene {
         if let Some(beam) = lidar.beam_at(libm::acos(cosine)) {
             return pulse_j * beam / lidar.beam_total();
         }
-        let [x, y] = [
+        let offset = [
             (u - camera.centre.0) * pitch[0],
             (v - camera.centre.1) * pitch[1],
         ];
-        let [half_x, half_y] = [(camera.width, pitch[0]), (camera.height, pitch[1])]
+        let half = [(camera.width, pitch[0]), (camera.height, pitch[1])]
             .map(|(n, p)| 0.5 * f64::from(n) * p);
-        let is_lit = match lidar.spot {
-            Spot::Rectangle => x.abs() <= half_x && y.abs() <= half_y,
-            Spot::Round => libm::hypot(x, y) <= libm::hypot(half_x, half_y),
-        };
+        let is_lit = lidar.spot.lights(offset, half);
         let share = lidar
             .spot
             .share_per_pixel(camera.height, camera.width, pitch);

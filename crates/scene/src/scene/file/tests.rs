@@ -45,6 +45,15 @@ fn bad_numbers_are_refused_with_their_line() {
 }
 
 #[test]
+fn a_place_of_two_numbers_is_refused() {
+    let two = "position_m = [-0.1, 0.0]";
+    let (error, text) = complaint_after("position_m = [-0.1, 0.0, 0.0]", two);
+    assert_eq!(error.line, line_with(&text, two));
+    let says = "a list of 2 is impossible; give a list of 3 numbers";
+    assert!(error.to_string().contains(says), "{error}");
+}
+
+#[test]
 fn optics_that_cannot_be_are_refused_with_their_line() {
     for (lines, says) in [
         (
