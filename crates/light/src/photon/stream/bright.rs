@@ -59,7 +59,12 @@ fn chunk_word(block: u32, chunk: u32) -> u32 {
 /// more where there are more SPADs, which then share what hardly moves the gap.
 #[inline(always)]
 fn gap_in_means(word: u32) -> f64 {
-    -branchless::ln((branchless::real(u64::from(word >> 4)) + 0.5) * 0.5f64.powi(28))
+    -branchless::ln(uniform(word))
+}
+
+#[inline(always)]
+fn uniform(word: u32) -> f64 {
+    (branchless::real(u64::from(word >> 4)) + 0.5) * 0.5f64.powi(28)
 }
 
 /// A block of background photons of [`TILE`] successive laser cycles, some photons of each at a time.
@@ -129,9 +134,14 @@ fn add_gaps(
     words: &[[u32; TILE]; PER_BLOCK],
     times_fs: &mut [[i64; TILE]; PER_BLOCK],
 ) {
-    for (words, times_fs) in words.iter().zip(times_fs) {
-        for ((at, &word), time_fs) in at.iter_mut().zip(words).zip(times_fs) {
-            *at = (*at + gap_in_means(word) * gap_fs).min(FARTHEST);
+    let mut lns = [0.0; PER_BLOCK * TILE];
+    for (number, &word) in lns.iter_mut().zip(words.as_flattened()) {
+        *number = uniform(word);
+    }
+    branchless::ln_of_all(&mut lns);
+    for (lns, times_fs) in lns.chunks_exact(TILE).zip(times_fs) {
+        for ((at, ln), time_fs) in at.iter_mut().zip(lns).zip(times_fs) {
+            *at = (*at - ln * gap_fs).min(FARTHEST);
             *time_fs = start_fs + branchless::count(branchless::floor(*at)) as i64;
         }
     }

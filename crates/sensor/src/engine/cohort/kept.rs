@@ -101,7 +101,7 @@ impl Ready {
     fn bytes(&self) -> usize {
         let of_way = match &self.way {
             Way::Recent(histories) => histories.number() * size_of::<f64>(),
-            Way::Alone | Way::Pooled | Way::Joint => 0,
+            Way::Pooled | Way::Joint => 0,
         };
         size_of::<Self>() + of_way
     }

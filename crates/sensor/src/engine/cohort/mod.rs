@@ -1,14 +1,13 @@
 //! The cohort engine: histograms without photons, at a cost that does not grow with the laser cycles.
 //!
 //! Laser cycles whose SPADs are in the same state move together: a binomial draw says how many of them see what in the
-//! next step. Four ways of keeping that state share one model of light and dead time:
+//! next step. Three ways of keeping that state share one model of light and dead time:
 //!
 //! | way | state | exact | cost of a bin |
 //! |---|---|---|---|
 //! | `pooled.rs` | how many SPADs fired 1, 2, … steps ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
 //! | `recent.rs` | in how many cycles which of the last 4, 6 or 8 bins had an event | every bin; two bins' correlation up to [`CohortOptions::neglect`] | 16, 64 or 256 draws, most of them of nothing |
 //! | `joint.rs` | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
-//! | `alone.rs` | one cycle, its SPADs one by one | all of it | a random number, more if a SPAD is hit |
 //!
 //! What they share, and what it costs in exactness:
 //!
@@ -39,7 +38,6 @@
 //! and the brightest light are left to the joint state, which has at most as many states as there are laser cycles.
 
 mod abreast;
-mod alone;
 mod blindness;
 mod cycles;
 mod draw;
@@ -49,6 +47,8 @@ mod grid;
 mod hits;
 mod joint;
 mod kept;
+#[cfg(test)]
+mod one_by_one;
 mod overlap;
 mod pooled;
 mod prepare;
@@ -105,7 +105,6 @@ pub struct Cohort {
 
 /// How the state of laser cycles alike is kept.
 enum Way {
-    Alone,
     Pooled,
     Recent(Histories),
     Joint,
@@ -248,7 +247,6 @@ impl Cohort {
         let is_event = &self.is_event;
         for Ready { like, way } in prepared.iter().flatten() {
             let counts = match way {
-                Way::Alone => alone::run(like, is_event, random),
                 Way::Pooled => pooled::run(like, is_event, random),
                 Way::Recent(histories) => histories.run(like.cycles, random),
                 Way::Joint => joint::run(like, is_event, random),
@@ -261,9 +259,6 @@ impl Cohort {
 
     /// The cheapest way that neglects no more than it may.
     fn way(&self, like: &LikeCycles) -> Way {
-        if like.cycles == 1 {
-            return Way::Alone;
-        }
         let photons = pooled::largest(&like.means);
         let spads = self.is_event.spads() as u64 * like.cycles;
         if photons <= self.most_photons
@@ -286,7 +281,7 @@ impl Cohort {
         light: &PixelLight,
     ) -> Result<f64, EngineError> {
         let of = |like: LikeCycles| match self.way(&like) {
-            Way::Alone | Way::Pooled => like.means.len() as f64,
+            Way::Pooled => like.means.len() as f64,
             Way::Recent(histories) => of_histories(histories.number()),
             Way::Joint => of_joint_states(&like, self.is_event.spads()),
         };

@@ -330,8 +330,8 @@ const ROUNDING: f64 = 1e-13;
 #[cfg(test)]
 mod tests {
     use super::super::Means;
-    use super::super::alone;
     use super::super::blindness::{Ages, Blindness};
+    use super::super::one_by_one;
     use super::*;
     use crate::photon::DeadTimeLaw;
 
@@ -366,9 +366,10 @@ mod tests {
                 let mut random = RandomWords::new(6, 0);
                 let mut seen = [vec![[0u32; 32]; BINS - 4], vec![[0u32; 32]; BINS - 4]];
                 for _ in 0..TRIALS {
-                    let alone = alone::run(&like, &is_event, &mut random);
-                    for (seen, counts) in
-                        seen.iter_mut().zip([alone, histories.run(1, &mut random)])
+                    let reference = one_by_one::run(&like, &is_event, &mut random);
+                    for (seen, counts) in seen
+                        .iter_mut()
+                        .zip([reference, histories.run(1, &mut random)])
                     {
                         for (seen, bins) in seen.iter_mut().zip(counts.windows(5)) {
                             let word = bins.iter().fold(0, |word, &bin| word << 1 | bin as usize);
@@ -376,11 +377,14 @@ mod tests {
                         }
                     }
                 }
-                let [alone, drawn] = seen.each_ref().map(|seen| seen.as_flattened());
-                for (alone, drawn) in alone.iter().zip(drawn) {
-                    let error = 5.0 * f64::from(alone + drawn + 1).sqrt();
-                    let off = f64::from(*alone) - f64::from(*drawn);
-                    assert!(off.abs() < error, "{law:?}, {is_event:?}: {alone} {drawn}");
+                let [reference, drawn] = seen.each_ref().map(|seen| seen.as_flattened());
+                for (reference, drawn) in reference.iter().zip(drawn) {
+                    let error = 5.0 * f64::from(reference + drawn + 1).sqrt();
+                    let off = f64::from(*reference) - f64::from(*drawn);
+                    assert!(
+                        off.abs() < error,
+                        "{law:?}, {is_event:?}: {reference} {drawn}"
+                    );
                 }
             }
         }

@@ -11,8 +11,8 @@
 //! times of photons are worked out only there.
 //!
 //! That is for little light of one layer. Other dim light goes into a table of bits, where dead time is decided for many laser
-//! cycles at once ([`tabled`]). Bins of a delay line are sorted ([`sorted`]), or settled cycle by cycle ([`whole`]); bright light is
-//! counted many laser cycles side by side ([`side_by_side`]), or one after the other ([`bright`]).
+//! cycles at once ([`tabled`]). Where photons decide about each other that are not on one SPAD, laser cycles are settled as a whole
+//! ([`whole`]). Bright light is counted many laser cycles side by side ([`side_by_side`]), or one after the other ([`bright`]).
 
 use smallvec::SmallVec;
 
@@ -22,11 +22,12 @@ use super::echo_rows::EchoRows;
 use super::past::PastDraws;
 use super::pulses::Window;
 use super::sight::{ROUNDING_FS, Sight, Spans};
+use super::table;
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
 use crate::engine::Work;
 use crate::photon::{
-    Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
-    SpadRows,
+    DeadTimeLaw, Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place,
+    SpadEvent, SpadRows,
 };
 use crate::units::Time;
 use spacing::Spacing;
@@ -36,7 +37,6 @@ use whole::ByWindow;
 mod bright;
 mod settling;
 mod side_by_side;
-mod sorted;
 mod spacing;
 mod tabled;
 mod tile;
@@ -65,6 +65,8 @@ pub(super) struct Counting<'a> {
     together: Vec<(usize, Code)>,
     /// SPADs that fired by row, in one cycle.
     fired: [u8; ROWS],
+    /// When pulses on its photon line come, fs after the start of the window's cycle.
+    pulses_fs: Vec<i64>,
     /// Photons of one cycle's window.
     photons: Vec<Photon>,
     /// The same as words that sort by time.
@@ -74,6 +76,8 @@ pub(super) struct Counting<'a> {
     events: Vec<SpadEvent>,
     /// The same with their bin + 1; 0 outside the window.
     placed: Vec<(SpadEvent, usize)>,
+    /// SPADs with an odd number of events by row, in one cycle.
+    odd: Vec<u64>,
     /// Of each part of bright light.
     listed: Vec<ListedEchoes>,
     /// Photons of one cycle of bright light, by SPAD and time.
@@ -209,11 +213,13 @@ impl<'a> Counting<'a> {
             tables: Tables::take(),
             together: Vec::new(),
             fired: [0; ROWS],
+            pulses_fs: Vec::new(),
             photons: Vec::new(),
             keys: Vec::new(),
             by_cycle: Vec::new(),
             events: Vec::new(),
             placed: Vec::new(),
+            odd: vec![0; bins + 1],
             listed: Vec::new(),
             rows: SpadRows::default(),
             tile: None,
@@ -263,16 +269,10 @@ impl<'a> Counting<'a> {
             self.count_bright(&mut pixel);
             return (pixel.hits, pixel.work);
         }
-        if self.stream.config().spads.dead_time_spread > 0.0 {
-            // The other methods take one dead time.
+        let shares_words = self.stream.spads() <= table::WORD as usize;
+        if self.stream.config().spads.dead_time_spread > 0.0 || !(has_clk_bins || shares_words) {
+            // The other methods take one dead time, and a table the laser cycles of a delay line that are in one word.
             self.count_layers(&mut pixel);
-            return (pixel.hits, pixel.work);
-        }
-        if !has_clk_bins {
-            match self.can_sort(&pixel) {
-                true => self.count_sorted(&mut pixel),
-                false => self.count_layers(&mut pixel),
-            }
             return (pixel.hits, pixel.work);
         }
         let expected = light.expected(&sight.plain.own) + light.expected(&sight.plain.previous);
@@ -280,7 +280,7 @@ impl<'a> Counting<'a> {
             Some(_) => LITTLE_WITH_SECONDARIES,
             None => LITTLE,
         };
-        let is_little = light.is_alone && expected <= little;
+        let is_little = light.is_alone && has_clk_bins && expected <= little;
         if !(is_little && has_marks && has_slots_for_bins && pixel.sees_own_echo_only()) {
             self.count_tabled(&mut pixel);
             return (pixel.hits, pixel.work);
@@ -389,6 +389,35 @@ impl<'a> Counting<'a> {
         let own = &self.plain.own;
         let is_of_echo = photon < self.first_code[0] && photon >= PER_BLOCK * own.slots().len();
         !is_of_echo || own.within_fs().contains(&in_draw(light, own, photon))
+    }
+
+    /// Calls `fire` with number and time of each photon that fires its SPAD, of those of one SPAD that come at `times_fs`, rising, after the start
+    /// of the window's cycle; `None` where that depends on what came before them.
+    #[inline]
+    fn fire_by_times(
+        &self,
+        sight: &Sight,
+        times_fs: impl Iterator<Item = i64>,
+        mut fire: impl FnMut(usize, i64),
+    ) -> Option<()> {
+        let spads = &self.stream.config().spads;
+        let dead_fs = spads.dead_time.as_fs();
+        let wanted_from_fs = sight.first_fs - ROUNDING_FS;
+        let known_from_fs = sight.plain.from_fs + ROUNDING_FS;
+        let mut blind_until_fs = known_from_fs - 1 + dead_fs;
+        let mut is_unknown = true;
+        for (number, time_fs) in times_fs.enumerate() {
+            if time_fs > blind_until_fs {
+                is_unknown = false;
+                blind_until_fs = time_fs + dead_fs;
+                fire(number, time_fs);
+            } else if is_unknown && time_fs >= wanted_from_fs {
+                return None;
+            } else if is_unknown || spads.law == DeadTimeLaw::Paralysable {
+                blind_until_fs = blind_until_fs.max(time_fs + dead_fs);
+            }
+        }
+        Some(())
     }
 
     /// The window of a laser cycle.

@@ -125,6 +125,29 @@ impl Table {
         dead_time::settle(layout, &mut self.words, &mut self.doubt, room, words)
     }
 
+    /// Words with photons that may meet on the photon line: two of them in a row of the window, or in rows that are so close.
+    pub(super) fn meeting(&mut self, layout: &Layout, words: usize) -> impl Iterator<Item = u32> {
+        let words = if layout.meets.is_empty() { 0 } else { words };
+        let meeting = &mut self.numbers;
+        meeting.clear();
+        meeting.resize(words, 0);
+        let rows = &self.words;
+        let row = |row: usize| &rows[(row + 1) * ROW..][..words];
+        for (here, &first) in (layout.before..).zip(&layout.meets) {
+            for (meeting, &word) in meeting.iter_mut().zip(row(here)) {
+                *meeting |= word & word.wrapping_sub(1);
+            }
+            for earlier in first..here {
+                let pairs = row(earlier).iter().zip(row(here));
+                for (meeting, (&earlier, &word)) in meeting.iter_mut().zip(pairs) {
+                    *meeting |= u16::from((earlier != 0) & (word != 0));
+                }
+            }
+        }
+        let words = (0..).zip(meeting.iter());
+        words.filter_map(|(at, &meeting)| (meeting != 0).then_some(at))
+    }
+
     /// Takes the laser cycle of every photon in doubt out of the bins, to be settled as a whole.
     pub(super) fn doubt_cycles(&mut self, layout: &Layout, spad_bits: u32, words: usize) {
         let doubt = &mut self.doubt[..words];

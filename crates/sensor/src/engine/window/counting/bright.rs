@@ -8,7 +8,7 @@ use std::ops::Range;
 use smallvec::SmallVec;
 
 use super::super::sight::ROUNDING_FS;
-use super::{BREEDING, Counting, Pixel, Placed};
+use super::{Counting, Pixel, Placed};
 use crate::chip::MOST_SPADS;
 use crate::photon::{ListedEchoes, Photon, PhotonStream, PixelStream, TILE, sort_photons};
 use crate::units::Time;
@@ -275,20 +275,6 @@ impl Counting<'_> {
                 None => return begin,
             }
         }
-    }
-
-    /// Whether an avalanche that breeds, or what it causes, may be in what is drawn at first for the window of a laser cycle.
-    pub(super) fn breeds_about(&mut self, pixel: &Pixel<'_>, laser_cycle: u32) -> bool {
-        if pixel.breeding.is_none() {
-            return false;
-        }
-        let Some(begin) = self.beginning(pixel, laser_cycle) else {
-            return true;
-        };
-        self.photons.clear();
-        let window = self.window(pixel.sight, laser_cycle);
-        self.push_breeding(pixel, BREEDING, begin, &window);
-        !self.photons.is_empty()
     }
 
     /// Appends the photons of a part of the light that breed since a beginning, and before it as far as what they cause may come later.

@@ -4,16 +4,19 @@
 //!   one special photon  ── shares its bin               ──► the bin's CLK period has two SPADs
 //!        │              ── shares its SPAD, farther apart than the memory ──► both count
 //!        │              ── shares its SPAD, closer      ──► the second is lost, if the first was seen for certain
-//!        ╰─ else, more of them, or one near an edge     ──► SPAD by SPAD, with as much of the past as it takes
+//!        ╰─ else, more of them, or one near an edge     ──► SPAD by SPAD by exact times, with as much of the past as it takes
 //! ```
 //!
 //! What other photons the cycle has does not matter in the first three cases: whoever shared a SPAD or a bin with
 //! them, too, would be special as well.
 
+use smallvec::SmallVec;
+
 use super::{Counting, Pixel, in_draw};
 use crate::engine::window::codes::{Code, SPAD_MARKS};
 use crate::engine::window::tables::Special;
 use crate::photon::{Group, Photon};
+use crate::units::Time;
 
 impl Counting<'_> {
     /// Settles the cycle of a special photon.
@@ -99,31 +102,25 @@ impl Counting<'_> {
         }
         let work = pixel.work;
         let mut left = several;
-        if !is_doubtful {
-            left = self.settle_pairs(pixel, several);
-        }
-        if left != 0 && pixel.breeding.is_some() {
-            // Photons that breed did not matter to the window so far, but may when it is looked back.
-            pixel.work = work;
-            for (_, code) in &self.together {
-                self.fired[code.row()] = 0;
+        while left != 0 {
+            let spad = left.trailing_zeros() as u8;
+            left &= left - 1;
+            if !self.settle_spad(pixel, laser_cycle, spad) {
+                // Photons that breed did not matter to the window so far, but may when it is looked back.
+                pixel.work = work;
+                self.fired[..=pixel.hits.len()].fill(0);
+                let photons = self.breeding.of(laser_cycle..laser_cycle + 1).iter();
+                self.photons.clear();
+                self.photons.extend(photons.map(|&(_, photon)| photon));
+                self.take_cycle(pixel, Some(last), laser_cycle);
+                self.settle_cycle(pixel, laser_cycle);
+                return;
             }
-            let photons = self.breeding.of(laser_cycle..laser_cycle + 1).iter();
-            self.photons.clear();
-            self.photons.extend(photons.map(|&(_, photon)| photon));
-            self.take_cycle(pixel, Some(last), laser_cycle);
-            self.settle_cycle(pixel, laser_cycle);
-            return;
         }
         for (_, code) in &self.together {
             self.tables.remove(code.row());
             let alone = several >> code.spad() & 1 == 0;
             self.fired[code.row()] += u8::from(alone);
-        }
-        while left != 0 {
-            let spad = left.trailing_zeros() as u8;
-            left &= left - 1;
-            self.settle_spad(pixel, laser_cycle, spad);
         }
         if is_doubtful {
             for row in 0..=pixel.hits.len() {
@@ -134,20 +131,6 @@ impl Counting<'_> {
             let row = self.together[index].1.row();
             self.tell(pixel, row);
         }
-    }
-
-    /// Settles those of some SPADs that have just two photons and need no look back; returns the others.
-    fn settle_pairs(&mut self, pixel: &mut Pixel<'_>, spads: u64) -> u64 {
-        let mut left = spads;
-        let mut next = spads;
-        while next != 0 {
-            let spad = next.trailing_zeros() as u8;
-            next &= next - 1;
-            if self.settle_pair(pixel, spad) {
-                left &= !(1 << spad);
-            }
-        }
-        left
     }
 
     /// Adds what fired in a CLK period to its bin.
@@ -164,21 +147,6 @@ impl Counting<'_> {
             pixel.work.clk_periods_visited += u64::from(spads > 0);
             pixel.work.pulses += u64::from(spads);
         }
-    }
-
-    /// Settles the photons of one SPAD if they are just two; neither is doubtful. Returns whether it did.
-    fn settle_pair(&mut self, pixel: &mut Pixel<'_>, spad: u8) -> bool {
-        let mut photons = self.together.iter().filter(|(_, code)| code.spad() == spad);
-        let (Some(&a), Some(&b), None) = (photons.next(), photons.next(), photons.next()) else {
-            return false;
-        };
-        let Some(fired) = self.pair(pixel, [a, b]) else {
-            return false;
-        };
-        for ((_, code), fired) in [a, b].into_iter().zip(fired) {
-            self.fired[code.row()] += fired;
-        }
-        true
     }
 
     /// Which of a SPAD's only two photons make pulses that are counted, if what was before them does not matter, as it
@@ -223,39 +191,56 @@ impl Counting<'_> {
         Some([1; 2])
     }
 
-    /// Settles the photons of one SPAD among those `together`.
-    fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
+    /// Settles the photons of one SPAD among those `together`. Returns whether it did: not where it takes a look back and photons may breed.
+    fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) -> bool {
         let window = self.window(pixel.sight, laser_cycle);
-        self.photons.clear();
-        let mut seen = 0;
+        let bins = pixel.hits.len();
+        // Times after the start of the window's cycle, and rows; 0 outside the window.
+        let mut photons = SmallVec::<[(i64, usize); 8]>::new();
         for &(photon, code) in &self.together {
             if code.spad() == spad && self.is_drawn(pixel.light, photon) {
-                let time = window.start + self.time_of(pixel.light, photon, laser_cycle);
-                seen += u64::from(window.row_of(time).is_some());
-                self.photons.push(Photon::new(time, spad, false));
+                let time = self.time_of(pixel.light, photon, laser_cycle);
+                let row = if code.is_doubtful() {
+                    window.row_of(window.start + time).unwrap_or(0)
+                } else {
+                    code.row() % (bins + 1)
+                };
+                photons.push((time.as_fs(), row));
             }
         }
+        photons.sort_unstable();
+        let seen = photons.iter().filter(|(_, row)| *row > 0).count();
         if seen == 0 {
-            return;
+            return true;
         }
-        self.detect(pixel, &window, 1 << spad);
-        let mut last = None;
-        for event in &self.events {
-            let Some(row) = window.row_of(event.time) else {
-                continue;
-            };
-            seen -= 1;
-            // Two pulses within one CLK period cancel.
-            if last == Some(row) {
-                self.fired[row] -= 1;
-                pixel.work.pulses += 2;
-                pixel.work.cancelled += 2;
-                last = None;
-            } else {
-                self.fired[row] += 1;
-                last = Some(row);
+        let mut rows = SmallVec::<[usize; 8]>::new();
+        let times_fs = photons.iter().map(|&(time_fs, _)| time_fs);
+        let fire = |number: usize, _: i64| rows.push(photons[number].1);
+        let known = self.fire_by_times(pixel.sight, times_fs, fire);
+        if known.is_none() {
+            if pixel.breeding.is_some() {
+                return false;
             }
+            let photons = photons.iter().map(|&(time_fs, _)| {
+                Photon::new(window.start + Time::from_fs(time_fs), spad, false)
+            });
+            self.photons.clear();
+            self.photons.extend(photons);
+            self.detect(pixel, &window, 1 << spad);
+            let events = self.events.iter();
+            rows = events
+                .filter_map(|event| window.row_of(event.time))
+                .collect();
         }
-        pixel.work.lost_to_dead_time += seen;
+        rows.retain(|row| *row > 0);
+        pixel.work.lost_to_dead_time += (seen - rows.len()) as u64;
+        for rows in rows.chunk_by(|a, b| a == b) {
+            // Two pulses within one CLK period cancel.
+            let cancelled = rows.len() as u64 / 2 * 2;
+            self.fired[rows[0]] += (rows.len() % 2) as u8;
+            pixel.work.pulses += cancelled;
+            pixel.work.cancelled += cancelled;
+        }
+        true
     }
 }

@@ -1,6 +1,6 @@
 //! Counting bright macropixels, many laser cycles at a time: which may be counted so, and what is drawn for them.
 //!
-//! Lanes that a [`Tile`](super::tile::Tile) leaves undecided, and those that may have a photon that breeds, are left to
+//! Lanes that a [`Tile`](super::tile::Tile) leaves undecided are left to
 //! [`count_bright_cycle`](super::Counting::count_bright_cycle).
 
 use super::bright::Beginning;
@@ -19,7 +19,8 @@ impl Counting<'_> {
         let last_cycle = config.laser_cycles.checked_sub(1)?;
         let is_alike = config.spads.dead_time_spread == 0.0;
         let is_packed = self.stream.spads() == SPADS && light.is_alone && is_alike;
-        if !is_packed || light.has_listed_echo() {
+        // Where one avalanche in a hundred causes another, so many laser cycles would be counted one by one that all take less time.
+        if !is_packed || light.has_listed_echo() || pixel.has_secondaries() {
             return None;
         }
         let begin = self.beginning(pixel, last_cycle)?;
@@ -88,9 +89,6 @@ impl Counting<'_> {
                 false => 0,
             }),
         );
-        for lane in 0..lanes {
-            tile.undecided |= u16::from(self.breeds_about(pixel, cycle(lane))) << lane;
-        }
         light.first_arrivals(first_cycle, &mut tile.next_fs);
         if !light.echo_fs().is_empty() {
             light.echo_words(first_cycle, 1, &mut tile.second_words);

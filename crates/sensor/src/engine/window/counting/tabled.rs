@@ -6,7 +6,8 @@
 //!                                              └─ depend on what came before ──► history
 //! ```
 //!
-//! Laser cycles with a photon whose avalanche causes others, or with one of those, are settled as a whole.
+//! Laser cycles with a photon whose avalanche causes others, or with one of those, are settled as a whole. On a photon line, those with
+//! photons that may meet are counted by times, and settled as a whole where they do.
 
 use std::cell::Cell;
 
@@ -59,7 +60,9 @@ struct Tabling<'t> {
     end: u32,
     /// Photons of bins.
     seen: u64,
-    /// Pulses that cancel each other.
+    /// Pulses that are counted, but not in the table.
+    pulses: u64,
+    /// And those that cancel each other.
     cancelled: u64,
 }
 
@@ -250,7 +253,15 @@ impl Counting<'_> {
         let config = self.stream.config();
         let spans = &pixel.sight.plain;
         let within_fs = &spans.own.within_fs;
-        let layout = Layout::new(pixel.sight.rows.edges_fs(), spans.from_fs, &config.spads);
+        let law = &self.engine.law;
+        let stage = (!law.has_clk_bins()).then(|| law.timing().photon_line_stage);
+        let bins_fs = pixel.sight.rows.edges_fs();
+        let layout = Layout::new(bins_fs, spans.from_fs, &config.spads, stage);
+        // Of a line, rows have at most one SPAD of a laser cycle that is not settled as a whole.
+        let adds = match stage {
+            None => self.adds.clone(),
+            Some(_) => vec![0, 1],
+        };
         let parts = pixel.parts;
         kept.drawn
             .resize_with(kept.drawn.len().max(parts.len()), Drawn::default);
@@ -274,22 +285,23 @@ impl Counting<'_> {
                 spad_bits,
                 end: cycles << spad_bits,
                 seen: 0,
+                pulses: 0,
                 cancelled: 0,
             };
             self.draw_table(pixel, &mut tabling, &mut kept);
             let words = tabling.words();
             if kept.table.settle(&layout, words) {
-                if pixel.has_secondaries() {
+                if pixel.has_secondaries() || stage.is_some() {
                     kept.table.doubt_cycles(&layout, spad_bits, words);
                 }
                 tabling.collect(self, pixel, &mut kept);
                 self.settle_keys(pixel, &mut tabling, &mut kept);
             }
-            let mut pulses = tabling.cancelled;
-            pixel.work.cancelled += pulses;
+            let mut pulses = tabling.pulses + tabling.cancelled;
+            pixel.work.cancelled += tabling.cancelled;
             for (bin, hits) in pixel.hits.iter_mut().enumerate() {
                 let row = layout.before + 1 + bin;
-                let [adds, fired, visited] = kept.table.count(row, spad_bits, words, &self.adds);
+                let [adds, fired, visited] = kept.table.count(row, spad_bits, words, &adds);
                 *hits += adds;
                 pulses += fired as u64;
                 pixel.work.clk_periods_visited += visited as u64;
@@ -394,8 +406,17 @@ impl Counting<'_> {
             };
             if cycle < cycles && photons.iter().any(matters) {
                 kept.whole.push(cycle);
-                kept.table.doubt_place(cycle << tabling.spad_bits);
             }
+        }
+        let in_word = WORD >> tabling.spad_bits;
+        for word in kept.table.meeting(tabling.layout, tabling.words()) {
+            let cycles = word * in_word..((word + 1) * in_word).min(cycles);
+            kept.whole.extend(cycles);
+        }
+        kept.whole.sort_unstable();
+        kept.whole.dedup();
+        for cycle in &kept.whole {
+            kept.table.doubt_place(cycle << tabling.spad_bits);
         }
     }
 

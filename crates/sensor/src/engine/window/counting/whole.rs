@@ -184,23 +184,21 @@ impl Counting<'_> {
             self.engine
                 .keep_line_edges(&mut self.placed, |(event, _)| *event);
         }
+        for &(event, row) in &self.placed {
+            self.odd[row] ^= 1 << event.spad;
+        }
+        self.odd[0] = 0;
         let mut left = 0;
-        for of_bin in self.placed.chunk_by(|a, b| a.1 == b.1) {
-            let row = of_bin[0].1;
-            if row == 0 {
-                continue;
-            }
-            let spads = of_bin
-                .iter()
-                .fold(0, |spads, (event, _)| spads ^ 1 << event.spad);
-            let adds = self.engine.adds(spads);
-            pixel.hits[row - 1] += adds;
-            if is_line {
-                left += adds as u64;
+        for (hits, spads) in pixel.hits.iter_mut().zip(&mut self.odd[1..]) {
+            let spads = std::mem::take(spads).count_ones();
+            let adds = self.adds[spads as usize];
+            *hits += adds;
+            left += if is_line {
+                adds as u64
             } else {
-                left += u64::from(spads.count_ones());
-                pixel.work.clk_periods_visited += 1;
-            }
+                u64::from(spads)
+            };
+            pixel.work.clk_periods_visited += u64::from(spads > 0 && !is_line);
         }
         pixel.work.cancelled += pulses - left;
         pulses

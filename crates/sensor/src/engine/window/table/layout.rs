@@ -2,6 +2,7 @@
 
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::photon::{DeadTimeLaw, SpadModel};
+use crate::units::Time;
 
 /// Most rows before the window. A longer memory has longer rows.
 const MOST_BEFORE: usize = 16;
@@ -18,6 +19,9 @@ pub(in crate::engine::window) struct Layout {
     pub before: usize,
     /// By row: the first one whose photons blind it for certain, and the first one whose photons may.
     pub(super) reach: Vec<[usize; 2]>,
+    /// By row of the window and the one after it: the first one whose photons may come less than a stage of the photon line before
+    /// its photons. Empty where there is no such line.
+    pub(super) meets: Vec<usize>,
     /// How many rows what came before the table may blind.
     pub(super) open: usize,
     /// Whether a SPAD may fire twice in a row.
@@ -28,8 +32,13 @@ pub(in crate::engine::window) struct Layout {
 }
 
 impl Layout {
-    /// Of a window whose bins have these edges; photons are known from `from_fs` on.
-    pub(in crate::engine::window) fn new(bins_fs: &[i64], from_fs: i64, spads: &SpadModel) -> Self {
+    /// Of a window whose bins have these edges; photons are known from `from_fs` on. `stage` is that of the photon line, if SPADs have one.
+    pub(in crate::engine::window) fn new(
+        bins_fs: &[i64],
+        from_fs: i64,
+        spads: &SpadModel,
+        stage: Option<Time>,
+    ) -> Self {
         let (first_fs, bins) = (bins_fs[0], bins_fs.len() - 1);
         let bin_fs = (bins_fs[bins] - first_fs) / bins as i64;
         let memory_fs = (first_fs - from_fs).max(1);
@@ -60,9 +69,17 @@ impl Layout {
             }
             reach.push([blind, may]);
         }
+        let meets = |stage: Time| {
+            let first = |row: usize| {
+                let far_fs = edges_fs[row] - SLACK_FS - stage.as_fs();
+                edges_fs[1..=row].partition_point(|&end_fs| end_fs <= far_fs)
+            };
+            (before..=rows).map(first).collect()
+        };
         Layout {
             before,
             reach,
+            meets: stage.map_or_else(Vec::new, meets),
             open: (0..rows)
                 .take_while(|&row| edges_fs[row] - SLACK_FS <= from_fs + dead_fs)
                 .count(),

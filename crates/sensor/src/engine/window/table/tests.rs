@@ -40,7 +40,7 @@ proptest! {
         let spads = SpadModel { law, ..SpadModel::with_dead_time(Time::from_fs(dead_fs)) };
         let edges_fs: Vec<i64> = (0..=bins).map(|bin| bin * bin_fs).collect();
         let from_fs = -dead_fs - ROUNDING_FS - room_fs;
-        let layout = Layout::new(&edges_fs, from_fs, &spads);
+        let layout = Layout::new(&edges_fs, from_fs, &spads, None);
         let (begin_fs, end_fs) = (3 * from_fs, bins * bin_fs + bin_fs);
         let time = |at: f64| begin_fs + (at * (end_fs - begin_fs) as f64) as i64;
         let photons: Vec<(u32, i64)> = photons.into_iter().map(|(place, at)| (place, time(at))).collect();
@@ -77,6 +77,44 @@ proptest! {
             let pulses = cycles.iter().sum::<usize>() as i64;
             let lit = cycles.iter().filter(|&&spads| spads > 0).count() as i64;
             prop_assert_eq!(counts, [hits, pulses, lit]);
+        }
+    }
+
+    /// Two photons of a word that come closer than a stage of the photon line, one of them in the window, whatever the bins.
+    #[test]
+    fn photons_that_may_meet_are_noticed(
+        widths_fs in prop::collection::vec(0i64..400_000, 1..20),
+        stage_fs in 1i64..200_000,
+        photons in prop::collection::vec((0u32..128, -0.2f64..1.2), 0..40),
+    ) {
+        prop_assume!(widths_fs.iter().sum::<i64>() > 100_000);
+        let mut edges_fs = vec![0];
+        for width_fs in widths_fs {
+            edges_fs.push(edges_fs[edges_fs.len() - 1] + width_fs);
+        }
+        let end_fs = edges_fs[edges_fs.len() - 1];
+        let (dead_fs, stage) = (4_000_000, Some(Time::from_fs(stage_fs)));
+        let spads = SpadModel::with_dead_time(Time::from_fs(dead_fs));
+        let layout = Layout::new(&edges_fs, -dead_fs - ROUNDING_FS, &spads, stage);
+        let time = |at: f64| (at * end_fs as f64) as i64;
+        let photons: Vec<(u32, i64)> = photons.into_iter().map(|(place, at)| (place, time(at))).collect();
+        let mut table = Table::default();
+        let words = (128 / WORD) as usize;
+        table.clear(&layout, words);
+        for &(place, time_fs) in &photons {
+            table.put(layout.edges_fs.partition_point(|&edge_fs| edge_fs <= time_fs), place);
+        }
+        let meeting: Vec<u32> = table.meeting(&layout, words).collect();
+        for word in 0..words as u32 {
+            let of_word: Vec<_> = photons.iter().filter(|(place, _)| place / WORD == word).collect();
+            let meets = of_word.iter().any(|(place, time_fs)| {
+                let mut others = of_word.iter().filter(|(other, _)| other != place);
+                let meets = others.any(|(_, other_fs)| (other_fs - time_fs).abs() < stage_fs);
+                meets && (0..end_fs).contains(time_fs)
+            });
+            let is_noticed = meeting.contains(&word);
+            prop_assert!(is_noticed || !meets);
+            prop_assert!(!is_noticed || of_word.len() > 1);
         }
     }
 }

@@ -4,7 +4,7 @@ use super::{Tabled, Tabling};
 use crate::engine::window::counting::{Counting, Pixel, Placed};
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::engine::window::table::{Places, Table, WORD};
-use crate::photon::{DeadTimeLaw, Photon};
+use crate::photon::Photon;
 use crate::units::Time;
 
 /// A key has the place above, and below it the time since the table begins, fs.
@@ -150,6 +150,7 @@ impl Counting<'_> {
             std::mem::take(&mut kept.whole),
         );
         let mut whole_cycles = whole.iter().copied().peekable();
+        let is_line = !self.engine.law.has_clk_bins();
         loop {
             let next = by_cycle.peek().map(|keys| cycle_of(keys[0]));
             let next_whole = whole_cycles.peek().copied();
@@ -158,16 +159,31 @@ impl Counting<'_> {
             };
             let keys = by_cycle.next_if(|_| next == Some(cycle)).unwrap_or(&[]);
             let is_whole = whole_cycles.next_if_eq(&cycle).is_some();
+            let window = self.window(pixel.sight, first + cycle);
+            let first_parent = parents.partition_point(|&(other, _)| other < cycle);
+            let own = parents[first_parent..].iter();
+            let mut own = own.take_while(|(other, _)| *other == cycle).peekable();
+            let is_on_line = is_whole && is_line && own.peek().is_none();
+            if is_on_line && self.count_line(pixel, tabling, &window, keys) {
+                continue;
+            }
             kept.fired.clear();
             let of_spads = keys.chunk_by(|&a, &b| place_of(a) == place_of(b));
-            let window = self.window(pixel.sight, first + cycle);
             let mut is_known = !is_whole;
             for keys in of_spads {
-                is_known = is_known
-                    && self
-                        .fire_by_times(tabling, &window, keys, &mut kept.fired)
-                        .is_some();
-                if is_known || pixel.has_secondaries() {
+                is_known = is_known && {
+                    let times_fs = keys.iter().map(|&key| tabling.of_key(key).1);
+                    let place = place_of(keys[0]);
+                    let fire = |_: usize, time_fs: i64| {
+                        let row = tabling.layout.row_of(time_fs);
+                        let row = row.unwrap_or_else(|| tabling.exact_row(&window, time_fs));
+                        if tabling.is_in_bins(row) {
+                            kept.fired.push((place, row));
+                        }
+                    };
+                    self.fire_by_times(pixel.sight, times_fs, fire).is_some()
+                };
+                if is_known || is_whole || pixel.has_secondaries() {
                     continue;
                 }
                 let place = place_of(keys[0]);
@@ -194,45 +210,52 @@ impl Counting<'_> {
                 .iter()
                 .filter(|photon| window.is_seen(photon.time));
             tabling.seen -= seen.count() as u64;
-            let first_parent = parents.partition_point(|&(other, _)| other < cycle);
-            let own = parents[first_parent..].iter();
-            let own = own.take_while(|(other, _)| *other == cycle);
             self.photons.extend(own.map(|&(_, photon)| photon));
             self.settle_cycle(pixel, first + cycle);
         }
         (kept.keys, kept.parents, kept.whole) = (keys, parents, whole);
     }
 
-    /// Appends the rows in which a SPAD fires by the times of its photons; `None` where that depends on what came before them.
-    fn fire_by_times(
-        &self,
-        tabling: &Tabling<'_>,
+    /// Counts a laser cycle of SPADs on a photon line by the times of its photons. Returns whether it did: not where pulses may meet on the
+    /// line, or depend on what came before.
+    fn count_line(
+        &mut self,
+        pixel: &mut Pixel<'_>,
+        tabling: &mut Tabling<'_>,
         window: &Placed<'_>,
         keys: &[u64],
-        fired: &mut Vec<(u32, usize)>,
-    ) -> Option<()> {
-        let spads = &self.stream.config().spads;
-        let dead_fs = spads.dead_time.as_fs();
-        let wanted_from_fs = window.sight.first_fs - ROUNDING_FS;
-        let known_from_fs = window.sight.plain.from_fs + ROUNDING_FS;
-        let mut blind_until_fs = known_from_fs - 1 + dead_fs;
-        let mut is_unknown = true;
-        for &key in keys {
-            let (place, time_fs) = tabling.of_key(key);
-            if time_fs > blind_until_fs {
-                is_unknown = false;
-                blind_until_fs = time_fs + dead_fs;
+    ) -> bool {
+        let mut pulses_fs = std::mem::take(&mut self.pulses_fs);
+        pulses_fs.clear();
+        let mut of_spads = keys.chunk_by(|a, b| a >> PLACE_SHIFT == b >> PLACE_SHIFT);
+        let are_known = of_spads.all(|keys| {
+            let times_fs = keys.iter().map(|&key| tabling.of_key(key).1);
+            let fire = |_: usize, time_fs: i64| pulses_fs.push(time_fs);
+            self.fire_by_times(pixel.sight, times_fs, fire).is_some()
+        });
+        pulses_fs.sort_unstable();
+        let stage_fs = self.engine.law.timing().photon_line_stage.as_fs();
+        let wanted_from_fs = pixel.sight.first_fs - ROUNDING_FS;
+        let mut pairs = pulses_fs.windows(2);
+        let is_counted = are_known
+            && pairs.all(|pair| pair[1] - pair[0] >= stage_fs || pair[1] < wanted_from_fs);
+        if is_counted {
+            for &time_fs in &pulses_fs {
                 let row = tabling.layout.row_of(time_fs);
                 let row = row.unwrap_or_else(|| tabling.exact_row(window, time_fs));
                 if tabling.is_in_bins(row) {
-                    fired.push((place, row));
+                    self.odd[row - tabling.layout.before] ^= 1;
+                    tabling.cancelled += 1;
                 }
-            } else if is_unknown && time_fs >= wanted_from_fs {
-                return None;
-            } else if is_unknown || spads.law == DeadTimeLaw::Paralysable {
-                blind_until_fs = blind_until_fs.max(time_fs + dead_fs);
+            }
+            for (hits, odd) in pixel.hits.iter_mut().zip(&mut self.odd[1..]) {
+                let edge = std::mem::take(odd);
+                *hits += edge as i64;
+                tabling.pulses += edge;
+                tabling.cancelled -= edge;
             }
         }
-        Some(())
+        self.pulses_fs = pulses_fs;
+        is_counted
     }
 }
