@@ -22,11 +22,13 @@ cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
 
-# The README's picture; look at it.
+# The README's picture, and that of the first hour; look at them.
 cd ../scenes
 frame=$(mktemp -d)
 cargo run --release --quiet -- frame --scene outdoor.toml --probe none --out "$frame"
 cp "$frame/depth.png" outdoor_depth.png
+cargo run --release --quiet -- frame --scene warehouse --sensor vcsel_flash --probe none --out "$frame"
+cp "$frame/depth.png" ../../docs/src/pictures/warehouse_depth.png
 rm -r "$frame"
 
 # Verdicts of the published figures.

@@ -39,8 +39,9 @@ pub fn role(command: &str, argument: &str) -> Role {
         }
         (
             _,
-            "sensor" | "scene" | "world" | "liberty" | "left" | "right" | "calib" | "truth"
-            | "calibration" | "inits" | "events" | "sdf" | "histograms" | "frame" | "study",
+            "sensor" | "chip" | "scene" | "world" | "liberty" | "left" | "right" | "calib"
+            | "truth" | "calibration" | "inits" | "events" | "sdf" | "histograms" | "frame"
+            | "study",
         ) => Input(""),
         (
             _,

@@ -50,6 +50,7 @@ mod runs_survive_faults;
 mod scenes_name_files;
 #[cfg(unix)]
 mod silicon_replays;
+mod starting_points;
 mod sweeps_go_on;
 mod the_book_lists_every_key;
 mod the_book_reads_plainly;
