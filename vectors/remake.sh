@@ -15,7 +15,8 @@ GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     histograms_of_any_sensor_are_ranged::the_sample_logs_give_their_distances \
     histograms_of_any_sensor_are_ranged::a_table_is_ranged_and_written
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
-    the_book_lists_every_key::with_its_unit_range_and_source
+    the_book_lists_every_key::with_its_unit_range_and_source \
+    python_knows_every_key::with_the_type_of_its_values
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     the_same_everywhere::with_any_number_of_threads
 cd vectors/replay

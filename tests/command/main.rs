@@ -40,6 +40,7 @@ mod photons_reach_any_chip;
 mod probes_keep_their_first_hits;
 #[cfg(unix)]
 mod progress_shows_on_a_terminal;
+mod python_knows_every_key;
 mod quiet_runs_say_nothing;
 mod real_histograms_are_ranged;
 #[cfg(unix)]
