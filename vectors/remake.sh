@@ -15,18 +15,21 @@ GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     histograms_of_any_sensor_are_ranged::the_sample_logs_give_their_distances \
     histograms_of_any_sensor_are_ranged::a_table_is_ranged_and_written
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
-    the_book_lists_every_key::with_its_unit_range_and_source
+    the_book_lists_every_key::with_its_unit_range_and_source \
+    python_knows_every_key::with_the_type_of_its_values
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     the_same_everywhere::with_any_number_of_threads
 cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
 
-# The README's picture; look at it.
+# The README's picture, and that of the first hour; look at them.
 cd ../scenes
 frame=$(mktemp -d)
 cargo run --release --quiet -- frame --scene outdoor.toml --probe none --out "$frame"
 cp "$frame/depth.png" outdoor_depth.png
+cargo run --release --quiet -- frame --scene warehouse --sensor vcsel_flash --probe none --out "$frame"
+cp "$frame/depth.png" ../../docs/src/pictures/warehouse_depth.png
 rm -r "$frame"
 
 # Verdicts of the published figures.

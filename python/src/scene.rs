@@ -20,7 +20,7 @@ use crate::values::{
 /// A scene: one that is built in, a file, and single keys of it.
 ///
 /// Scene()                                        the street
-/// Scene("van", {"lidar.pde": 0.2})               a built-in scene: street, van, fog, glass, sweep, night or empty
+/// Scene("van", {"lidar.pde": 0.2})               a built-in scene: street, warehouse, van, fog, glass, sweep, night or empty
 /// Scene("my_street.toml", {"object.car.reflectivity": "10 %"})
 ///
 /// Keys are those of `gdtof scene`, with dots; objects go by their name, or their number from 1. A scene cannot be changed: `with_`
@@ -34,6 +34,9 @@ pub(crate) struct Scene {
     #[pyo3(get)]
     name: String,
 }
+
+/// Most objects that `repr` names.
+const NAMED: usize = 5;
 
 impl Scene {
     pub(crate) fn or_default(scene: Option<&Bound<'_, Self>>) -> World {
@@ -143,8 +146,14 @@ impl Scene {
     }
 
     fn __repr__(&self) -> String {
-        let objects: Vec<&str> = self.world.objects.iter().map(|o| o.name.as_str()).collect();
-        format!("<Scene {}: {}>", self.name, objects.join(", "))
+        let objects = &self.world.objects;
+        let first = objects.iter().take(NAMED).map(|o| o.name.as_str());
+        let first = first.collect::<Vec<&str>>().join(", ");
+        let more = match objects.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        format!("<Scene {}: {first}{more}>", self.name)
     }
 
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {

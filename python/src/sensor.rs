@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
+use guided_dtof::chip::sensors::CHIPS;
 use guided_dtof::chip::{Sensor as Chip, SensorConfig};
 use guided_dtof::request::Sources;
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use toml::Table;
+use toml::{Table, Value};
 
 use crate::failure::Failure;
 use crate::values::{
@@ -17,7 +18,7 @@ use crate::values::{
 /// A sensor: a chip by name, a file, or keys.
 ///
 /// Sensor()                                   the QuantIC4x4
-/// Sensor("hslidar", clk_hz="300 MHz")        a chip by name, and a key of it
+/// Sensor("vcsel_flash", clk_hz="150 MHz")    a chip by name (vcsel_flash, hslidar, hslidar_delay_line), and a key of it
 /// Sensor("my_chip.toml", rows=16, cols=16)   a file
 ///
 /// Keys are those of `gdtof sensor`, which also lists their units and ranges; numbers may be texts with a unit. They are read as
@@ -137,14 +138,24 @@ impl Sensor {
         hash_of(&self.table())
     }
 
+    /// The call that makes it, from the chip that it shares most keys with.
     fn __repr__(&self) -> String {
-        let (own, usual) = (self.table(), Table::try_from(SensorConfig::default()));
-        let usual = usual.expect("numbers and words");
-        let other = own
-            .iter()
-            .filter(|(key, value)| usual.get(*key) != Some(*value));
-        let keys: Vec<String> = other.map(|(key, value)| format!("{key}={value}")).collect();
-        format!("Sensor({})", keys.join(", "))
+        let own = self.table();
+        let arguments_after = |(name, chip): &(&str, fn() -> Chip)| {
+            let usual = Table::try_from(&*chip()).expect("numbers and words");
+            let is_other = |(key, value): &(&String, &Value)| usual.get(*key) != Some(*value);
+            let keys = own.iter().filter(is_other).map(|(key, value)| match value {
+                Value::Boolean(true) => format!("{key}=True"),
+                Value::Boolean(false) => format!("{key}=False"),
+                value => format!("{key}={value}"),
+            });
+            let is_default = *name == CHIPS[0].0;
+            let name = (!is_default).then(|| format!("{name:?}"));
+            name.into_iter().chain(keys).collect::<Vec<String>>()
+        };
+        let calls = CHIPS.iter().map(arguments_after);
+        let shortest = calls.min_by_key(Vec::len).unwrap_or_default();
+        format!("Sensor({})", shortest.join(", "))
     }
 
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {

@@ -32,6 +32,10 @@ def test_sensors_come_from_names_files_and_keys(tmp_path: Path) -> None:
     assert dict(sensor.to_dict()) == {key: sensor[key] for key in sensor.keys()}
     assert gdtof.Sensor.from_toml(sensor.to_toml()) == sensor
     assert repr(sensor) == "Sensor(clk_hz=300000000.0, cols=4, rows=8)"
+    assert repr(gdtof.Sensor("vcsel_flash", rows=8)) == 'Sensor("vcsel_flash", rows=8)'
+    assert repr(gdtof.Sensor(paralysable=True)) == "Sensor(paralysable=True)"
+    assert repr(gdtof.Scene("sweep")).startswith("<Scene built-in sweep: ")
+    assert len(repr(gdtof.Scene("warehouse"))) < 120 and "more>" in repr(gdtof.Scene("warehouse"))
 
 
 def test_scenes_come_from_names_files_and_keys(tmp_path: Path) -> None:
@@ -51,7 +55,7 @@ def test_scenes_come_from_names_files_and_keys(tmp_path: Path) -> None:
         street["lidar.pdee"]
 
 
-@pytest.mark.parametrize("name", ["street", "van", "fog", "glass", "sweep", "night", "empty"])
+@pytest.mark.parametrize("name", ["street", "warehouse", "van", "fog", "glass", "sweep", "night", "empty"])
 def test_a_scene_comes_back_from_its_dict(name: str) -> None:
     scene = gdtof.Scene(name)
     back = gdtof.Scene.from_dict(scene.to_dict(), name=scene.name)
@@ -148,7 +152,7 @@ def test_copies_travel() -> None:
     ("ask", "says"),
     [
         (lambda: gdtof.Sensor(rows=0), "rows = 0 is impossible; give 1 to 256"),
-        (lambda: gdtof.Sensor(row=1), "unknown key `row`"),
+        (lambda: gdtof.Sensor(row=1), "unknown key `row`"),  # type: ignore[call-arg]
         (lambda: gdtof.Sensor(clk_hz="8 ns"), "is a time; give a frequency"),
         (lambda: gdtof.Sensor().with_(rows="many"), "is not a number; give a plain number"),
         (lambda: gdtof.Sensor.from_toml("rows = 0"), "sensor:1: rows = 0 is impossible"),
@@ -163,7 +167,7 @@ def test_copies_travel() -> None:
         (lambda: gdtof.frame(skip=1), "skip: 1 is impossible; give true or false"),  # type: ignore[arg-type]
         (lambda: gdtof.frame(seed=2**64), "18446744073709551616 is too large; give 64-bit numbers"),
         (lambda: gdtof.drive(segments=2.5), "segments: 2.5 is impossible; give a whole number, 0 to 4294967295"),  # type: ignore[arg-type]
-        (lambda: gdtof.Sensor(rows=2.5), "rows = 2.5 is impossible; give a whole number, 1 to 256"),
+        (lambda: gdtof.Sensor(rows=2.5), "rows = 2.5 is impossible; give a whole number, 1 to 256"),  # type: ignore[arg-type]
         (lambda: gdtof.Sensor.from_dict({"rows": True}), "sensor: rows = true is impossible; give a whole number, 1 to 256"),
         (lambda: gdtof.Scene("street", {"lidar.pde": [1]}), "pde = a list is impossible; give a number, 0 to 1"),
         (lambda: gdtof.Scene.from_dict({"lidar": {"pde": 2}}, "mine"), "mine: in [lidar], pde = 2 is impossible; give 0 to 1"),
@@ -187,7 +191,7 @@ def test_what_cannot_be_is_said_in_a_sentence(ask: object, says: str) -> None:
 
 def test_what_is_no_setting_is_a_type_error() -> None:
     with pytest.raises(TypeError, match="is no value of a setting"):
-        gdtof.Sensor(rows=object())
+        gdtof.Sensor(rows=object())  # type: ignore[arg-type]
     with pytest.raises(AttributeError, match="has no key"):
         _ = gdtof.Sensor().row
 

@@ -149,7 +149,7 @@ def test_a_replay(command: Command, tmp_path: Path) -> None:
         (("--laser-cycles", 0), lambda: gdtof.frame(laser_cycles=0)),
         (("--false-alarm-rate", 2), lambda: gdtof.frame(false_alarm_rate=2.0)),
         (("--set", "sensor.rows=0"), lambda: gdtof.Sensor(rows=0)),
-        (("--set", "sensor.rows=2.5"), lambda: gdtof.Sensor(rows=2.5)),
+        (("--set", "sensor.rows=2.5"), lambda: gdtof.Sensor(rows=2.5)),  # type: ignore[arg-type]
         (("--set", "sensor.rows=true"), lambda: gdtof.Sensor(rows=True)),
         (("--set", "scene.lidar.pde=[1]"), lambda: gdtof.Scene("street", {"lidar.pde": [1]})),
         (("--set", "scene.lidar.pde=2"), lambda: gdtof.Scene("street", {"lidar.pde": 2})),

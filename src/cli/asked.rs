@@ -137,8 +137,8 @@ pub(super) struct GuideArgs {
     /// How windows are chosen, such as unguided=neighbour. `--help` lists all keys.
     #[arg(long, value_name = "KEY=VALUE,…", long_help = policy_in_full())]
     windows: Option<String>,
-    /// Slow CLK down until windows are as long as the guide's claimed errors require (the policy's `within`). The
-    /// length of a laser cycle stays the same.
+    /// Slow CLK down until windows are as long as the guide's reported uncertainty requires (`within` of --windows).
+    /// The length of a laser cycle stays the same.
     #[arg(long)]
     bins_from_guide: bool,
 }

@@ -35,11 +35,11 @@ enum Demo {
     Limit,
     /// A figure stands at several distances up to 50 m, under 72 klux (Fig. 103 to 105).
     Sweep,
-    /// Ten vehicles with lidars of their own: what they cost guided, full, sliding and zooming histograms (8.2).
+    /// Ten vehicles with lidars: how they disturb guided, full, sliding and zooming histograms (8.2).
     Interference,
     /// A road sign beside a pedestrian, in lenses that scatter light.
     Sign,
-    /// A wall that throws laser light on a target.
+    /// A wall that reflects laser light onto a target.
     Corner,
 }
 

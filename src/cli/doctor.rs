@@ -1,4 +1,4 @@
-//! `gdtof doctor`: what the program uses of this machine, and which other tools it found.
+//! `gdtof doctor`: what the program uses on this machine, and which other tools it found.
 
 use std::process::{Command, Stdio};
 

@@ -24,7 +24,7 @@ use crate::system::{
 /// Arguments of `gdtof drive`.
 #[derive(Args)]
 pub(super) struct DriveArgs {
-    /// Scene (TOML), instead of --scene.
+    /// Scene: a name or a file, as for --scene.
     #[arg(value_name = "SCENE", conflicts_with = "scene")]
     world: Option<PathBuf>,
     #[command(flatten)]

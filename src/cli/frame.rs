@@ -25,7 +25,7 @@ use crate::waves::WaveFormat;
 /// Arguments of `gdtof frame`.
 #[derive(Args)]
 pub(super) struct FrameArgs {
-    /// Scene, instead of --scene.
+    /// Scene: a name or a file, as for --scene.
     #[arg(value_name = "SCENE", conflicts_with = "scene")]
     world: Option<PathBuf>,
     #[command(flatten)]
@@ -151,6 +151,9 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
         }
         if let Some(remark) = &frame.remark {
             tell(format_args!("\n{remark}\n"))?;
+        }
+        for hint in &frame.hints {
+            tell(format_args!("\n{hint}\n"))?;
         }
         for note in &timing.notes {
             tell(format_args!("\nNote on timing: {note}\n"))?;

@@ -66,9 +66,9 @@ struct Cli {
 enum Command {
     /// Take one guided frame of a scene: depth map, histograms, waveform.
     Frame(frame::FrameArgs),
-    /// Take frame after frame while the world moves: depth maps, and one recording.
+    /// Take frames one after another while the world moves: depth maps, and one recording.
     Drive(drive::DriveArgs),
-    /// Repeat an experiment of the thesis's demonstrator, and say whether it finds the target.
+    /// Repeat an experiment of the thesis's demonstrator, and print whether it finds the target.
     Demo(demo::DemoArgs),
     /// Write the SPAD pulses of a scene for any chip, or of a frame, as CSV, text, memory words, VCD or NumPy.
     Photons(photons::PhotonsArgs),
@@ -76,7 +76,7 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Compare the thesis's published figures with what the model computes.
     Reproduce(reproduce::ReproduceArgs),
-    /// Find depths in histograms that you have: a frame's, your chip's or those of a real sensor.
+    /// Find depths in histograms: of a frame, of your chip or of a real sensor.
     Range(range::RangeArgs),
     /// Measure the bins of a sensor with delay lines, by sweeping a picosecond laser over them.
     Calibrate(calibrate::CalibrateArgs),
@@ -84,20 +84,20 @@ enum Command {
     Stereo(stereo::StereoArgs),
     /// Measure how fast the engines are on this machine, and how much memory they take.
     Speed(speed::SpeedArgs),
-    /// Say how fast the chip can be clocked: verdict, ripple, periods, margins.
+    /// Find how fast the chip can be clocked: verdict, ripple, periods, margins.
     Timing(timing::TimingArgs),
     /// Estimate the power of each block of a macropixel, from the toggles of a gate-level run.
     Power(power::PowerArgs),
-    /// Make a table of frames, or of what theory says, over any settings.
+    /// Make a table of frames, or of theory, over any settings.
     Sweep(sweep::SweepArgs),
-    /// Say which chip to build: the best designs that find and measure a target.
+    /// Find which chip to build: the best designs that detect and measure a target.
     Propose(propose::ProposeArgs),
     /// Compare run time with error for every engine.
     Pareto(pareto::ParetoArgs),
     /// Print the sensor as a commented file: every key with its unit, range and source.
-    Sensor(SensorArgs),
+    Sensor(settings::PrintSensorArgs),
     /// Print the scene as a commented file: every key with its unit, range and source.
-    Scene(SceneArgs),
+    Scene(settings::PrintSceneArgs),
     /// Write one HTML file to look at a frame or a drive: maps, histograms, points in space.
     Page(page::PageArgs),
     /// Write one laser cycle of one macropixel as a waveform, after the frame has been taken.
@@ -107,7 +107,7 @@ enum Command {
     /// Write the chip, or a frame, for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
-    /// Say what the program uses of this machine, and which other tools it found.
+    /// Print what the program uses on this machine, and which other tools it found.
     Doctor(doctor::DoctorArgs),
     /// Print the JSON schema of sensor, scene or study files, for editors.
     Schema(shell::SchemaArgs),
@@ -174,8 +174,8 @@ pub fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(&args),
         Command::Propose(args) => propose::run(&args),
         Command::Pareto(args) => pareto::run(&args),
-        Command::Sensor(args) => settings::print_sensor(&args),
-        Command::Scene(args) => settings::print_scene(&args),
+        Command::Sensor(args) => settings::print_sensor(args),
+        Command::Scene(args) => settings::print_scene(args),
         Command::Export(command) => export::run(&command),
         Command::Doctor(args) => doctor::run(&args),
         Command::Schema(args) => shell::schema(&args),

@@ -29,7 +29,7 @@ const WORDS_NS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 /// Arguments of `gdtof photons`.
 #[derive(Args)]
 pub(super) struct PhotonsArgs {
-    /// Scene, instead of --scene.
+    /// Scene: a name or a file, as for --scene.
     #[arg(value_name = "SCENE", conflicts_with = "scene")]
     world: Option<PathBuf>,
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub(super) struct PhotonsArgs {
     /// Time that a word of memh covers, ns [default: 1].
     #[arg(long, value_name = "W")]
     word_ns: Option<f64>,
-    /// Leave CLK out of waveforms, which is most of a VCD in little light.
+    /// Leave CLK out of waveforms. In weak light, CLK is most of a VCD.
     #[arg(long)]
     no_clk: bool,
     /// Folder for the results; created if missing.

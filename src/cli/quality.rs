@@ -38,7 +38,7 @@ pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary)
         table.push("  bound of their counts", metres(summary.rms_bound_m));
     }
     table.push(
-        "  if every peak were a depth",
+        "  without the detection threshold",
         metres(summary.rms_error_of_every_peak_m),
     );
     table.push(

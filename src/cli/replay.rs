@@ -71,7 +71,8 @@ pub(super) struct ReplayArgs {
     /// --checks.
     #[arg(long, value_name = "FILE")]
     checks_json: Option<PathBuf>,
-    /// Print what became of the events, and the timing verdict, as JSON. Works on any engine; needs --out.
+    /// Print the number of events and of those that are not counted, and the timing verdict, as JSON. Works on any
+    /// engine; needs --out.
     #[arg(long, requires = "out")]
     json: bool,
 }
@@ -174,7 +175,7 @@ struct Replayed {
     coverage: Option<ClosedFormCoverage>,
 }
 
-/// What became of the events.
+/// How many events there are, and how many are not counted for which reason.
 #[derive(serde::Serialize)]
 struct Summary {
     engine: EngineKind,

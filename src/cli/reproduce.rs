@@ -25,8 +25,8 @@ pub(super) struct ReproduceArgs {
     /// zooming and sliding at 200 m and 75 m; may be repeated.
     #[arg(long, value_name = "N")]
     measurement: Vec<u32>,
-    /// What this Liberty file (or the files of one kit, separated by commas) says of the thesis's chip, beside the built-in cells; may be
-    /// repeated for further libraries, and nothing else is reproduced then.
+    /// Print only the thesis's chip in this cell library (a Liberty file, or the files of one kit, separated by commas), beside the
+    /// built-in cells; may be repeated for further libraries.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["claim", "figure", "table", "measurement", "frames", "json"])]
     liberty: Vec<PathBuf>,
     /// Frames behind each measured number, at least 100 [default: 300].

@@ -18,8 +18,8 @@ use crate::scene::Scene;
 /// Which sensor.
 #[derive(Args)]
 pub(super) struct SensorArgs {
-    /// Sensor: a file (TOML), or quantic4x4 (the default), hslidar or hslidar_delay_line.
-    #[arg(long, value_name = "FILE")]
+    /// Sensor: a file (TOML), or quantic4x4 (the default), vcsel_flash, hslidar or hslidar_delay_line.
+    #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<PathBuf>,
     /// Rows of macropixels, instead of the sensor's.
     #[arg(long, value_name = "R")]
@@ -27,8 +27,8 @@ pub(super) struct SensorArgs {
     /// Columns of macropixels, instead of the sensor's.
     #[arg(long, value_name = "C")]
     cols: Option<usize>,
-    /// Netlist (JSON of Yosys) in the place of a built-in block: p_counter=FILE (or FILE:MODULE); also correlation,
-    /// front_end, metdc and histogram.
+    /// Netlist (JSON of Yosys) that replaces a built-in block: p_counter=FILE (or FILE:MODULE). Other blocks are
+    /// correlation, front_end, metdc and histogram.
     #[arg(long, value_name = "BLOCK=FILE")]
     block: Vec<String>,
     /// Set one key of the sensor or scene, whatever its file says, for example sensor.clk_hz=300e6,
@@ -50,9 +50,29 @@ pub(super) struct SensorArgs {
 pub(super) struct SceneArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// Scene: a file (TOML), or street (the default), van, fog, glass, sweep, night or empty.
-    #[arg(long, value_name = "FILE")]
+    /// Scene: a file (TOML), or street (the default), warehouse, van, fog, glass, sweep, night or empty.
+    #[arg(long, value_name = "NAME|FILE")]
     scene: Option<PathBuf>,
+}
+
+/// Arguments of `gdtof sensor`.
+#[derive(Args)]
+pub(super) struct PrintSensorArgs {
+    /// Sensor: a name or a file, as for --sensor.
+    #[arg(value_name = "SENSOR", conflicts_with = "sensor")]
+    chip: Option<PathBuf>,
+    #[command(flatten)]
+    sensor: SensorArgs,
+}
+
+/// Arguments of `gdtof scene`.
+#[derive(Args)]
+pub(super) struct PrintSceneArgs {
+    /// Scene: a name or a file, as for --scene.
+    #[arg(value_name = "SCENE", conflicts_with = "scene")]
+    world: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
 }
 
 impl SensorArgs {
@@ -178,16 +198,21 @@ impl SceneArgs {
 ///
 /// # Errors
 /// Bad input.
-pub(super) fn print_sensor(args: &SensorArgs) -> anyhow::Result<()> {
-    Ok(say_file(args.read()?.commented())?)
+pub(super) fn print_sensor(args: PrintSensorArgs) -> anyhow::Result<()> {
+    let sensor = SensorArgs {
+        sensor: args.chip.or(args.sensor.sensor),
+        ..args.sensor
+    };
+    Ok(say_file(sensor.read()?.commented())?)
 }
 
 /// `gdtof scene`.
 ///
 /// # Errors
 /// Bad input.
-pub(super) fn print_scene(args: &SceneArgs) -> anyhow::Result<()> {
-    Ok(say_file(args.read()?.1.commented())?)
+pub(super) fn print_scene(args: PrintSceneArgs) -> anyhow::Result<()> {
+    let (_, scene) = args.scene.or_file(args.world).read()?;
+    Ok(say_file(scene.commented())?)
 }
 
 // What the chip is made of and where it is operated: `--process`, `--voltage`, `--temperature`, `--mismatch`.

@@ -24,7 +24,8 @@ fn complaint(error: &clap::Error) -> Option<InputError> {
     let text = |kind| texts(kind).first().copied().unwrap_or_default();
     let argument = text(ContextKind::InvalidArg);
     let name = bare(argument);
-    let meant = |kind, cure: &str| match texts(kind).first() {
+    // The likeliest is the last one.
+    let meant = |kind, cure: &str| match texts(kind).last() {
         Some(meant) => format!("did you mean `{meant}`?"),
         None => cure.to_owned(),
     };

@@ -42,7 +42,7 @@ keys! {
         guides: Vec<String> = Vec::new();
         /// Changes of the window policy, such as "unguided=neighbour,overlap=0.3".
         windows: String = String::new();
-        /// Slow CLK down until windows are as long as the guide's claimed errors require.
+        /// Slow CLK down until windows are as long as the guide's reported uncertainty requires.
         bins_from_guide: bool = false;
         .. {
             /// What complaints call these settings.

@@ -168,6 +168,7 @@ struct Ranged {
     depths: Vec<PixelDepth>,
     bin_s: f64,
     remark: Option<String>,
+    hints: Vec<String>,
     took_s: f64,
 }
 
@@ -222,6 +223,7 @@ impl Plan<'_> {
             histograms: counted.exposed.histograms.into_counts(),
             pixels: ranged.depths,
             remark: ranged.remark,
+            hints: ranged.hints,
             photons_expected: light.photons_expected(exposure),
             work: counted.exposed.work,
             kept: counted.kept,
@@ -353,6 +355,7 @@ impl Plan<'_> {
         };
         Ok(Ranged {
             remark: circumstances.remark(),
+            hints: circumstances.hints(),
             bin_s: ranger.bin_s(),
             depths,
             took_s: clock.lap(),

@@ -1,4 +1,5 @@
-//! One sentence on why a frame has so few depths: the commonest reason, with the numbers behind it and what would help.
+//! Sentences on why surfaces of a frame have no depth, with the numbers behind it and what would help: on the commonest reason if most have none, and
+//! hints on rarer reasons that settings can change.
 
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::{EventType, Exposure, Mode, Sensor, SensorConfig, WindowLaw};
@@ -10,6 +11,9 @@ use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// Share of laser cycles in which background alone counts in a bin, from which on less of it is advised instead of more light: chosen.
 const FULL_OF_BACKGROUND: f64 = 0.2;
+
+/// Least share of surfaces without a depth for a reason that is worth a hint: chosen.
+const WORTH_A_HINT: f64 = 0.01;
 
 /// A frame's circumstances.
 pub(super) struct Circumstances<'a> {
@@ -32,18 +36,12 @@ pub(super) struct Circumstances<'a> {
 impl Circumstances<'_> {
     /// The sentence, if fewer than half of the macropixels that see a surface have a depth.
     pub(super) fn remark(&self) -> Option<String> {
-        let seeing = || self.pixels.iter().filter(|p| p.true_m.is_some());
-        let surfaces = seeing().count();
+        let surfaces = self.surfaces();
         if surfaces == 0 {
             return Some("no depths, because no macropixel sees a surface".to_owned());
         }
-        let without = |reason| seeing().filter(|p| p.no_depth == Some(reason)).count();
-        let missing: usize = NoDepth::ALL.into_iter().map(without).sum();
-        if 2 * missing <= surfaces {
-            return None;
-        }
-        // Of equally common reasons the one that comes first holds first.
-        let commonest = NoDepth::ALL.into_iter().rev().max_by_key(|&r| without(r))?;
+        let commonest = self.reason_of_most()?;
+        let missing: usize = NoDepth::ALL.into_iter().map(|r| self.without(r)).sum();
         let why = match commonest {
             NoDepth::NoSurface => return None,
             NoDepth::NoGuide => self.no_guide(),
@@ -58,10 +56,53 @@ impl Circumstances<'_> {
                 "a fit puts these echoes before the laser's pulse; light so near or so strong does not tell its place".to_owned()
             }
         };
-        let (name, count) = (commonest.name(), without(commonest));
+        let (name, count) = (commonest.name(), self.without(commonest));
         Some(format!(
             "{missing} of {surfaces} surfaces have no depth, {count} of them for the reason {name:?}: {why}"
         ))
+    }
+
+    /// A sentence for each reason that settings can change and that is not rare, except the remark's.
+    pub(super) fn hints(&self) -> Vec<String> {
+        let is_said = self.reason_of_most();
+        let is_worth_it = |reason: NoDepth| {
+            is_said != Some(reason)
+                && self.without(reason) as f64 > WORTH_A_HINT * self.surfaces() as f64
+        };
+        let mut hints = Vec::new();
+        if is_worth_it(NoDepth::NoGuide) {
+            let (count, why) = (self.without(NoDepth::NoGuide), self.no_guide());
+            hints.push(format!(
+                "{count} surfaces have no guide: {why}; unguided = \"neighbour\" takes over the estimates of neighbours"
+            ));
+        }
+        if is_worth_it(NoDepth::Saturated) {
+            let (count, why) = (self.without(NoDepth::Saturated), self.saturated());
+            hints.push(format!("{count} surfaces are saturated: {why}"));
+        }
+        hints
+    }
+
+    /// Macropixels that see a surface.
+    fn surfaces(&self) -> usize {
+        self.pixels.iter().filter(|p| p.true_m.is_some()).count()
+    }
+
+    /// Surfaces without a depth for this reason.
+    fn without(&self, reason: NoDepth) -> usize {
+        let has_reason = |p: &&PixelDepth| p.true_m.is_some() && p.no_depth == Some(reason);
+        self.pixels.iter().filter(has_reason).count()
+    }
+
+    /// The commonest reason, if more than half of the surfaces have no depth.
+    fn reason_of_most(&self) -> Option<NoDepth> {
+        let missing: usize = NoDepth::ALL.into_iter().map(|r| self.without(r)).sum();
+        if 2 * missing <= self.surfaces() {
+            return None;
+        }
+        // Of equally common reasons the one that comes first holds first.
+        let reasons = NoDepth::ALL.into_iter().rev();
+        reasons.max_by_key(|&reason| self.without(reason))
     }
 
     /// Nearest and farthest of what macropixels without a depth for this reason have of `distance`.
@@ -74,7 +115,7 @@ impl Circumstances<'_> {
     fn no_guide(&self) -> String {
         let surfaces = self.span_m(NoDepth::NoGuide, |p| p.true_m);
         match self.guide.reach(self.scene) {
-            Some(reach) => format!("the surfaces are {surfaces} away, and {reach}"),
+            Some(reach) => format!("they are {surfaces} away, and {reach}"),
             None => format!(
                 "the guide ({}) has no estimate of surfaces {surfaces} away",
                 self.guide.name()
@@ -106,7 +147,11 @@ impl Circumstances<'_> {
         let cycles = self.exposure.laser_cycles;
         let most = self.greatest_chance(NoDepth::Saturated);
         // Three standard deviations of counts that a full bin would hold.
-        let fitting = (f64::from(full) - 3.0 * f64::from(full).sqrt()).max(1.0) / most;
+        let nearly_full = (f64::from(full) - 3.0 * f64::from(full).sqrt()).max(1.0);
+        if most * f64::from(cycles) < nearly_full {
+            return "no bin is full, but light fills the window so evenly that its counts do not tell where the echo lies; give less of it (a narrower filter, a smaller lens, less laser energy)".to_owned();
+        }
+        let fitting = nearly_full / most;
         format!(
             "bins are full at {full} counts (bin_bits = {}), and {cycles} laser cycles bring up to {:.0}; give more bits, or about {fitting:.0} laser cycles",
             self.sensor.bin_bits,
@@ -285,6 +330,34 @@ mod tests {
                 "{sensor}"
             );
         }
+    }
+
+    /// Cars nearer than the camera pair begins, and an exposure too long for the bins.
+    #[test]
+    fn rarer_reasons_that_settings_change_have_a_hint() {
+        let short_sighted = frame("", |scene| scene.stereo.max_disparity_px = 180.0);
+        assert_eq!(short_sighted.remark, None);
+        let [hint] = &short_sighted.hints[..] else {
+            panic!("{:?}", short_sighted.hints)
+        };
+        for words in [
+            "surfaces have no guide",
+            "from 19.3 m (max_disparity_px)",
+            "unguided = \"neighbour\"",
+        ] {
+            assert!(hint.contains(words), "{hint}");
+        }
+        // The same reason is not told twice.
+        let blind = frame("", |scene| scene.stereo.max_disparity_px = 20.0);
+        assert!(blind.remark.unwrap().contains("no guide"));
+        assert!(!blind.hints.iter().any(|hint| hint.contains("no guide")));
+        let full = frame("bin_bits = 9", |scene| {
+            scene.lidar.pulse_energy_uj = 1.0;
+            scene.light.illuminance_klux = 5.0;
+        });
+        let is_of_full_bins =
+            |hint: &String| hint.contains("are saturated: bins are full at 511 counts");
+        assert!(full.hints.iter().any(is_of_full_bins), "{:?}", full.hints);
     }
 
     /// An echo before the window is no light in it, and more light is no help where bins are full of the sun's.

@@ -55,6 +55,8 @@ pub struct Frame {
     pub pixels: Vec<PixelDepth>,
     /// Why most surfaces have no depth, where that is so.
     pub remark: Option<String>,
+    /// What would help against other reasons for missing depths: a sentence for each that settings can change.
+    pub hints: Vec<String>,
     /// Photons and dark counts that the light makes of the whole array on average.
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.

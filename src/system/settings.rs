@@ -18,12 +18,12 @@ words! {
     pub enum EngineKind {
         /// Event-driven simulation of the netlist with its delays.
         Gate = "gate",
-        /// The netlist as word operations, for every CLK period in which anything can change.
+        /// The netlist without delays, many macropixels at once, for every CLK period in which anything can change.
         Cycle = "cycle",
         /// Only the photons and CLK periods that a window can see.
         #[default]
         Window = "window",
-        /// No photons: histograms are drawn from their distribution, for all laser cycles in the same state at once.
+        /// No photons: histograms are drawn from their distribution.
         Cohort = "cohort",
     }
 }

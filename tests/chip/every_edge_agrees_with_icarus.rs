@@ -7,7 +7,7 @@ use std::io::{BufReader, Cursor};
 use std::time::Instant;
 
 use guided_dtof::chip::{
-    FrontEnd, Sensor, SensorConfig, Silicon, array, hslidar, hslidar_delay_line,
+    FrontEnd, Sensor, SensorConfig, Silicon, array, hslidar, hslidar_delay_line, vcsel_flash,
 };
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::{Corner, Netlist};
@@ -100,6 +100,7 @@ fn sensors_of_another_kind() {
         (wide8x8().unwrap(), 1),
         (hslidar(), 2),
         (hslidar_delay_line(), 2),
+        (vcsel_flash(), 1),
         (yosys::lfsr().into(), 1),
     ];
     let kinds = sensors.len() as u64;

@@ -39,9 +39,9 @@ pub fn role(command: &str, argument: &str) -> Role {
         }
         (
             _,
-            "sensor" | "scene" | "world" | "liberty" | "left" | "right" | "calib" | "truth"
-            | "calibration" | "inits" | "events" | "sdf" | "histograms" | "frame" | "study"
-            | "detector" | "crosstalk",
+            "sensor" | "chip" | "scene" | "world" | "liberty" | "left" | "right" | "calib"
+            | "truth" | "calibration" | "inits" | "events" | "sdf" | "histograms" | "frame"
+            | "study" | "detector" | "crosstalk",
         ) => Input(""),
         (
             _,

@@ -41,6 +41,7 @@ mod photons_reach_any_chip;
 mod probes_keep_their_first_hits;
 #[cfg(unix)]
 mod progress_shows_on_a_terminal;
+mod python_knows_every_key;
 mod quiet_runs_say_nothing;
 mod real_histograms_are_ranged;
 #[cfg(unix)]
@@ -51,6 +52,7 @@ mod runs_survive_faults;
 mod scenes_name_files;
 #[cfg(unix)]
 mod silicon_replays;
+mod starting_points;
 mod sweeps_go_on;
 mod the_book_lists_every_key;
 mod the_book_reads_plainly;

@@ -37,7 +37,7 @@ fn built_in_scenes_go_by_name_and_a_file_of_that_name_comes_first() {
     assert!(error.contains("did you mean `van`?"), "{error}");
     let error = refusal(folder.path(), "moon");
     assert!(
-        error.contains("give street, van, fog, glass, sweep, night or empty"),
+        error.contains("give street, warehouse, van, fog, glass, sweep, night or empty"),
         "{error}"
     );
     fs::create_dir(folder.path().join("night")).unwrap();

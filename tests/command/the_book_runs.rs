@@ -162,3 +162,12 @@ fn every_command_is_in_the_book() {
         assert!(all.contains(&format!("gdtof {name}")), "{name}");
     }
 }
+
+#[test]
+fn the_citation_names_this_version_and_licence() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let citation = std::fs::read_to_string(root.join("CITATION.cff")).unwrap();
+    let has = |line: &str| citation.lines().any(|other| other == line);
+    assert!(has(concat!("version: ", env!("CARGO_PKG_VERSION"))));
+    assert!(has(concat!("license: ", env!("CARGO_PKG_LICENSE"))));
+}

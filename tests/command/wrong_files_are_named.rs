@@ -28,7 +28,7 @@ const FOREIGN: [&str; 12] = [
 
 /// Files that are read for what they are by some arguments, by the arguments' names.
 const RIGHT: [(&str, &[&str]); 4] = [
-    ("sensor.toml", &["sensor"]),
+    ("sensor.toml", &["sensor", "chip"]),
     ("scene.toml", &["scene", "world"]),
     ("whole.png", &["left", "right", "truth"]),
     ("captures.json", &["histograms"]),

@@ -156,6 +156,11 @@ fn what_is_no_command_and_no_option_is_named() {
             &["fram"][..],
             "gdtof: fram: is not a command; did you mean `frame`?",
         ),
+        // Several names are like it, and one is more so.
+        (
+            &["scen"],
+            "gdtof: scen: is not a command; did you mean `scene`?",
+        ),
         (
             &["frame", "--lasercycles", "3"],
             "--lasercycles: is unknown here; did you mean `--laser-cycles`?",

@@ -1,17 +1,17 @@
-//! Chips that differ from the QuantIC4x4 in every number run on all engines, each from one description: one made up, and
-//! HSLIDAR, whose windows step by four CLK periods.
+//! Chips that differ from the QuantIC4x4 in every number run on all engines, each from one description: one made up,
+//! HSLIDAR, whose windows step by four CLK periods, and the flash lidar's with 32 bins.
 
 use crate::wide8x8::wide8x8;
 
-use guided_dtof::chip::{Exposure, Sensor, SensorConfig, Tdc, WindowLaw, hslidar};
+use guided_dtof::chip::{Exposure, Sensor, SensorConfig, Tdc, WindowLaw, hslidar, vcsel_flash};
 use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, Expose, Gate, LitPixel, Window, full_stream, stream_config,
 };
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 
-fn sensors() -> [Sensor; 2] {
-    [wide8x8().unwrap(), hslidar()]
+fn sensors() -> [Sensor; 3] {
+    [wide8x8().unwrap(), hslidar(), vcsel_flash()]
 }
 
 /// CLK periods of a laser cycle in which every window opens.
@@ -22,7 +22,8 @@ fn stop_periods(sensor: &Sensor) -> u32 {
 /// Light on windows all over the laser cycle.
 fn pixels(law: &WindowLaw, signal_per_cycle: f64) -> Vec<LitPixel> {
     let middle_bins = 0.4 * law.sensor().bins as f64;
-    let starts = [0u16, 5, 40, 77, 126];
+    let largest = law.sensor().largest_start();
+    let starts = [0u16, 5, 40, largest * 3 / 5, largest - 1];
     (0..)
         .zip(starts)
         .map(|(number, start)| {
@@ -72,13 +73,13 @@ fn windows_of_hslidar_step_by_half_a_window() {
 /// Means of 40 seeds, whose standard error is below 0.6 counts where most are counted.
 #[test]
 fn cohort_counts_the_same_on_average() {
-    let [wide8x8, hslidar] = sensors();
+    let [wide8x8, hslidar, vcsel_flash] = sensors();
     // A counter TDC is none for cohorts.
     let shift_register = SensorConfig {
         tdc: Tdc::Clocked,
         ..(*hslidar).clone()
     };
-    [wide8x8, shift_register.into()]
+    [wide8x8, shift_register.into(), vcsel_flash]
         .iter()
         .for_each(cohort_agrees);
 }

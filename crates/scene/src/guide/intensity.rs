@@ -58,9 +58,9 @@ keys! {
         exposure_ms: f64 ["ms"] = 1.0, in Within(1e-3, 1e4);
         /// Laser pulses in a second.
         pulse_rate_hz: f64 ["Hz"] = 80e3, in Within(0.0, 1e7), from "thesis Table 14";
-        /// Depth from which on disparities are searched.
+        /// Nearest depth that is searched.
         nearest_m: f64 ["m"] = 10.0, in Within(1.0, 1e4);
-        /// Standard deviation claimed for a matched disparity.
+        /// Reported uncertainty (standard deviation) of a matched disparity.
         disparity_sigma_px: f64 ["px"] = 0.5, in Within(1e-3, 100.0),
             from "measured on walls with a pattern";
     }

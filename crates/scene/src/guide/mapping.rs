@@ -173,7 +173,7 @@ impl Guide for BehaviouralStereo {
         let metre_pixels = stereo.camera().focal_px * stereo.baseline_m;
         let shortest_m = nearer_pair(stereo).map_or(stereo.baseline_m, |pair| pair.baseline_m);
         Some(format!(
-            "the camera pair measures from {:.1} m to {:.1} m, where both cameras see the same",
+            "the camera pair measures from {:.1} m (max_disparity_px) to {:.1} m (min_disparity_px), where both cameras see the same",
             stereo.camera().focal_px * shortest_m / stereo.max_disparity_px,
             metre_pixels / stereo.min_disparity_px,
         ))

@@ -41,7 +41,7 @@ keys! {
         times_stereo: f64 = 10.0, in Within(0.0, 1e4), from "thesis 5.3.2: more than ten times";
         /// Size, in macropixels, of patches that share an error.
         patch: u32 = 8, in Within(1.0, 1024.0);
-        /// Largest depth that is reported; everything farther appears there.
+        /// Largest depth that is reported; surfaces beyond it get this depth.
         farthest_m: f64 ["m"] = 200.0, in Above(0.0, 1e5);
     }
 }

@@ -31,12 +31,12 @@ keys! {
         /// Paths of the semi-global matching: 3, 4, 5 or 8; with 3 and 5, which come from above only, depths of roads
         /// lag behind.
         paths: u32 = 4, in Within(3.0, 8.0),
-            from "measured: on the street's road the median error is 2.3 times what is claimed with 5 and 0.2 with 8";
-        /// Contrast of the grain that surfaces without a texture have, 0.9 of its standard deviation.
+            from "measured: on the street's road the median error is 2.3 times the reported uncertainty with 5 paths, and 0.2 times with 8";
+        /// Contrast of the random pattern on surfaces that have no texture; its standard deviation is 0.9 of this.
         grain: f64 = 0.1, in Within(0.0, 1.0);
-        /// Standard deviation claimed for a disparity whose neighbours all have one, in binned pixels.
+        /// Reported uncertainty (standard deviation) of a disparity whose neighbours all have one, in binned pixels.
         sigma_px: f64 = 0.25, in Within(0.0, 100.0),
-            from "measured: 0.09 and a bias up to 0.12 on walls with the grain of the default, 0.2 with a fifth of it";
+            from "measured: 0.09 and a bias up to 0.12 on walls with the default pattern, 0.2 with a fifth of its contrast";
     }
 }
 

@@ -1,14 +1,19 @@
-//! The built-in scenes, by name: the street, and what the demonstrator met (thesis 6.4.1).
+//! The built-in scenes, by name: the street, the warehouse, and what the demonstrator met (thesis 6.4.1).
 
 use super::settings::Scene;
 use crate::settings::Document;
 
 /// Names, what they show, and their files.
-const SCENES: [(&str, &str, &str); 7] = [
+const SCENES: [(&str, &str, &str); 8] = [
     (
         "street",
         "a street on a bright day, 15 to 180 m",
         include_str!("../../../../vectors/scenes/outdoor.toml"),
+    ),
+    (
+        "warehouse",
+        "a forklift between pallet racks, 3 to 30 m, for vcsel_flash",
+        include_str!("../../../../vectors/scenes/warehouse.toml"),
     ),
     (
         "van",
@@ -73,7 +78,7 @@ mod tests {
             let scene = Scene::named(name).unwrap();
             assert!(!shows.is_empty());
             assert_eq!(Scene::parse(name, &scene.commented()).unwrap(), scene);
-            if name != "street" {
+            if !["street", "warehouse"].contains(&name) {
                 assert_eq!(scene.lidar, Lidar::demonstrator(), "{name}");
             }
         }

@@ -42,7 +42,7 @@ pub use own_block::OwnBlock;
 pub use probes::{LoadPins, LoadProbe, Probe, Probes, ReadPins, ReadProbe, SensorPins};
 pub use race::{Conflict, Cure, Irregular, NoAim, Race};
 pub use sensor_file::{Lines, NeverMet, SensorFault};
-pub use sensors::{Sensor, hslidar, hslidar_delay_line, quantic4x4};
+pub use sensors::{Sensor, hslidar, hslidar_delay_line, quantic4x4, vcsel_flash};
 pub use timing::ChipTiming;
 pub use timing::cell_library::{CellLibrary, FromFile};
 pub use timing::library_files::{library_files, library_setting};

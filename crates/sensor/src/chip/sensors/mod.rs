@@ -11,17 +11,20 @@
 mod hslidar;
 mod quantic4x4;
 mod sensor;
+mod vcsel_flash;
 
 pub use hslidar::{HSLIDAR_MOST_HZ, hslidar, hslidar_delay_line};
 pub use quantic4x4::quantic4x4;
 pub use sensor::Sensor;
+pub use vcsel_flash::vcsel_flash;
 
 /// A chip's name, and what makes its [`Sensor`].
 pub type Chip = (&'static str, fn() -> Sensor);
 
 /// The chips described here.
-pub const CHIPS: [Chip; 3] = [
+pub const CHIPS: [Chip; 4] = [
     ("quantic4x4", quantic4x4),
+    ("vcsel_flash", vcsel_flash),
     ("hslidar", hslidar),
     ("hslidar_delay_line", hslidar_delay_line),
 ];
