@@ -218,7 +218,11 @@ fn a_wrong_description_is_said_in_a_sentence() {
     write_table(&folder.join("one.csv"), [["1"; 24].join(",")].into_iter());
     let words = "range --format counts --histograms counts.csv --detector d.toml";
     for (text, more, says) in [
-        ("bin_width_ns = 1\n".to_owned(), "", "--pulse-fwhm-ns"),
+        (
+            "bin_width_ns = 1\n".to_owned(),
+            "",
+            "d.toml: pulse_fwhm_ns: is needed",
+        ),
         (
             "bin_edges_ns = [1, 2]\npulse_fwhm_ns = 1\n".into(),
             "",

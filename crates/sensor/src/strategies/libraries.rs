@@ -18,7 +18,7 @@ const SLEWS: [f64; 2] = [0.005, 0.3];
 const LOADS: [f64; 2] = [0.0005, 0.04];
 
 /// Numbers that a library with all cells takes.
-const NUMBERS: usize = 157;
+const NUMBERS: usize = 205;
 
 /// Text of Liberty files. It shrinks towards a library of all cells with the middles of their delays and limits.
 pub fn libraries() -> impl Strategy<Value = String> + Clone {

@@ -180,7 +180,9 @@ fn nobody_else_names_an_inner_net() {
         files.retain(|file| {
             let below = file.strip_prefix(root.join(folder)).unwrap_or(file);
             let is_testbench = folder == "src" && below.starts_with("testbenches");
-            !is_testbench && !below.starts_with("chip/probes")
+            // A cell library has pins of such names.
+            let writes_cells = below.ends_with("strategies/libraries.rs");
+            !is_testbench && !writes_cells && !below.starts_with("chip/probes")
         });
         for file in files {
             let text = std::fs::read_to_string(&file).unwrap();
