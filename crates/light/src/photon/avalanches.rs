@@ -18,15 +18,11 @@ use std::collections::BinaryHeap;
 
 use smallvec::{SmallVec, smallvec};
 
-use super::spad::{DeadTimeLaw, FEW_SPADS, Photon, SpadEvent, SpadModel};
+use super::spad::{DeadTimeLaw, FEW_SPADS, Photon, SpadEvent, SpadModel, Unknown};
 use super::spad_grid::SpadGrid;
 use super::spad_rows::SpadRows;
 use super::stream::{OrderedEchoes, PixelStream};
 use crate::units::Time;
-
-/// What is asked for depends on the time before the photons are known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Unknown;
 
 /// Where a photon comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -21,7 +21,7 @@ mod spad_rows;
 mod stream;
 mod tail;
 
-pub use avalanches::{Avalanches, Unknown, apply_dead_time};
+pub use avalanches::{Avalanches, apply_dead_time};
 pub use budget::{Convention, PhotonBudget, Spot};
 pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
@@ -37,7 +37,7 @@ pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
 pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, MOST_SPREAD, Photon, SpadEvent, SpadModel,
-    sort_photons,
+    Unknown, sort_photons,
 };
 pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use spad_layout::SpadLayout;

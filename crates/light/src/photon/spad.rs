@@ -64,6 +64,10 @@ pub struct Photon {
     pub breeds: bool,
 }
 
+/// What is asked of SPADs depends on the time before the photons are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unknown;
+
 impl SpadEvent {
     /// A pulse at a time.
     pub const fn new(time: Time, spad: u8) -> Self {

@@ -10,8 +10,7 @@
 //! the SPAD's state is not known yet, only the first and the last photon of a row matter. The results are those of
 //! [`Avalanches::run`](super::Avalanches::run).
 
-use super::avalanches::Unknown;
-use super::spad::{DeadTimeLaw, Photon, SpadEvent};
+use super::spad::{DeadTimeLaw, Photon, SpadEvent, Unknown};
 use super::stream::PixelStream;
 use crate::units::Time;
 

@@ -12,13 +12,10 @@
 //! 90 % of what can be had. That and all keys hold at 25 °C, where every factor here is exactly 1.
 
 use super::curve::Measured;
-use super::settings::Lidar;
+use super::settings::{Lidar, REFERENCE_C};
 use crate::numerics::integrate;
 use crate::photon::{Filter, FilterShape};
 use crate::units::{BOLTZMANN_EV_PER_K, ZERO_CELSIUS_K};
-
-/// Temperature of the lidar at which its keys hold, °C.
-pub(super) const REFERENCE_C: f64 = 25.0;
 
 /// The chip's junction is so much warmer, K. Chosen: the built-in library, whose delays the default scene has, is of 50 °C.
 const JUNCTION_RISE_K: f64 = 25.0;

@@ -26,6 +26,7 @@ mod mirrors;
 mod motion;
 mod object;
 mod optics;
+mod others_light;
 mod rig;
 mod rules;
 mod settings;

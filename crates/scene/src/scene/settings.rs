@@ -6,7 +6,6 @@ use glam::DVec3;
 
 use super::camera::PinholeCamera;
 use super::curve::Measured;
-use super::heat::REFERENCE_C;
 use super::interferer::Interferer;
 use super::medium::Medium;
 use super::object::Object;
@@ -24,6 +23,9 @@ use crate::units::Time;
 /// in sunlight that returns no echo. A tenth of a white wall is of the order of a clear sky in
 /// the near infrared; haze is brighter.
 pub const SKY_REFLECTIVITY: f64 = 0.1;
+
+/// Temperature of the lidar at which its keys hold, °C.
+pub(super) const REFERENCE_C: f64 = 25.0;
 
 /// A world and the optics through which it is seen. By default there is nothing in it.
 ///

@@ -20,8 +20,8 @@ use super::bounce::Bounce;
 use super::bounds::{Bounds, Cone};
 use super::camera::PinholeCamera;
 use super::cast::{End, First, Return, Returns, Stage};
-use super::interferer::OtherLight;
 use super::medium::Medium;
+use super::others_light::OtherLight;
 use super::vector::Ray;
 
 /// Rays of a macropixel in a row and in a column.

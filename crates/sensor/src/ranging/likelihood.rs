@@ -58,6 +58,9 @@ pub(super) const WIDE_IN_REGION: Free = [true, true, false, true];
 /// What is left where the place is given.
 pub(super) const ONLY_SIGNAL: Free = [false, true, false, false];
 
+/// Deviance that a width of its own must save (Akaike).
+pub(super) const OF_A_WIDTH: f64 = 2.0;
+
 /// A histogram, and what may have made it.
 #[derive(Debug, Clone)]
 pub(super) struct Likelihood<'a> {

@@ -11,8 +11,7 @@
 //! places, each weighed by its likelihood under the best signal there, and the bound their standard deviation.
 
 use super::expected::EchoLight;
-use super::likelihood::{Fit, Likelihood, ONLY_SIGNAL};
-use super::walk::OF_A_WIDTH;
+use super::likelihood::{Fit, Likelihood, OF_A_WIDTH, ONLY_SIGNAL};
 
 /// Standard deviation of a pulse most of which lies within a bin, bins.
 pub(super) const SHORT: f64 = 0.4;

@@ -20,7 +20,9 @@ use serde::{Deserialize, Serialize};
 
 use self::many_starts::with_rivals;
 use super::expected::{EchoLight, Response};
-use super::likelihood::{ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO, WIDE_IN_REGION};
+use super::likelihood::{
+    ECHO, Fit, Free, IN_REGION, Likelihood, OF_A_WIDTH, WIDE_ECHO, WIDE_IN_REGION,
+};
 use super::peak::Peak;
 use super::place::{SHORT, averaged};
 use crate::chip::EventType;
@@ -30,9 +32,6 @@ mod many_starts;
 /// Shares of the most background with which the best fit under a THRESHOLD is tried again: chosen. Of 495 random lights under a
 /// THRESHOLD six were fitted more than half a bound beside without, and one is with it.
 const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
-
-/// Deviance that a width of its own must save (Akaike).
-pub(super) const OF_A_WIDTH: f64 = 2.0;
 
 /// Standard deviation with which a deep echo is sought, bins: chosen.
 const DEEP_BINS: f64 = 2.5;

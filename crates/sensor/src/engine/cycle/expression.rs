@@ -16,8 +16,8 @@
 
 use std::collections::HashMap;
 
-use super::levelise::Unlevelled;
 use super::survey::{Class, Survey};
+use super::unlevelled::Unlevelled;
 use crate::netlist::{CellKind, NetId};
 
 /// An expression, `delay` periods late, perhaps inverted.

@@ -25,6 +25,7 @@ mod schedule;
 mod stream;
 mod survey;
 mod tape;
+mod unlevelled;
 mod word;
 
 use std::sync::OnceLock;
@@ -41,12 +42,12 @@ use crate::chip::window_law::WindowLaw;
 use crate::chip::{Exposure, Sensor};
 use crate::photon::{PhotonStream, SpadEvent};
 use levelise::Levelised;
-pub use levelise::Unlevelled;
 use packing::{PERIODS, Packed};
 use schedule::Schedule;
 use stream::Flow;
 use survey::Survey;
 use tape::Block;
+pub use unlevelled::Unlevelled;
 use word::{WORD_LANES, Word, inversion};
 
 /// A netlist that can be run.

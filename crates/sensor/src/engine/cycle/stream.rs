@@ -19,8 +19,8 @@ use std::cell::Cell;
 use multiversion::multiversion;
 
 use super::expression::{Expressions, Literal, Node};
-use super::levelise::Unlevelled;
 use super::packing::{PERIODS, Packed, Pulse};
+use super::unlevelled::Unlevelled;
 use super::word::{Word, inversion};
 use crate::netlist::NetId;
 

@@ -16,7 +16,7 @@
 
 use std::collections::HashMap;
 
-use super::levelise::Unlevelled;
+use super::unlevelled::Unlevelled;
 use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, array};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};

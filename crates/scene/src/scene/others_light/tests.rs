@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::photon::{PhotonStream, PixelLight, SpadModel, StreamConfig};
-use crate::scene::{GroundTruth, Object, Shape};
+use crate::scene::{GroundTruth, Interferer, Object, Shape, turned};
 use crate::units::Frequency;
 
 fn other(keys: &str) -> Interferer {
