@@ -34,7 +34,7 @@ pub struct Agreement {
 }
 
 impl Detector {
-    /// The mean of each bin ([`expected`](crate::ranging::expected) has the formulas). A pulse is no shorter than a fiftieth of a bin.
+    /// The mean of each bin (`ranging/expected/other_bins` has the formulas). A pulse is no shorter than a fiftieth of a bin.
     pub fn expected(&self, light: &SurfaceLight) -> Vec<f64> {
         let cycles = self.laser_cycles.unwrap_or(1);
         let law = self.law(cycles);
