@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 
+BIN_NS, FWHM_NS = 0.8, 1.5
+
+
 def tof(first_of: int | None = None) -> gdtof.Detector:
-    return gdtof.Detector(bins=48, bin_ns=0.8, pulse_fwhm_ns=1.5, start_ns=2.0, first_of=first_of)
+    return gdtof.Detector(bins=48, bin_ns=BIN_NS, pulse_fwhm_ns=FWHM_NS, start_ns=2.0, first_of=first_of)
 
 
 def drawn(detector: gdtof.Detector, depths: np.ndarray, photons: float, background: float) -> np.ndarray:
@@ -19,11 +22,11 @@ def drawn(detector: gdtof.Detector, depths: np.ndarray, photons: float, backgrou
     for zone, depth in enumerate(depths):
         for _ in range(cycles):
             centre = 2 * depth / 0.299792458
-            echo = random.normal(centre, detector.pulse_fwhm_ns / 2.354820045, random.poisson(photons / cycles))
-            span = detector.bins * detector.bin_ns
+            echo = random.normal(centre, FWHM_NS / 2.354820045, random.poisson(photons / cycles))
+            span = detector.bins * BIN_NS
             light = random.uniform(0, span, random.poisson(background / cycles)) + (detector.start_ns or 0.0)
             times = np.concatenate([echo, light])
-            bins = np.floor((times - (detector.start_ns or 0.0)) / detector.bin_ns).astype(int)
+            bins = np.floor((times - (detector.start_ns or 0.0)) / BIN_NS).astype(int)
             bins = bins[(bins >= 0) & (bins < detector.bins)]
             if detector.first_of is not None:
                 bins = np.sort(bins)[:1]
@@ -98,7 +101,7 @@ def test_a_file_describes_a_detector_as_its_arguments_do(tmp_path: Path) -> None
 
 
 def test_a_surface_in_the_flank_of_a_glass_is_ranged() -> None:
-    detector = gdtof.Detector(bins=48, bin_ns=0.8, pulse_fwhm_ns=1.5, start_ns=-4.0)
+    detector = gdtof.Detector(bins=48, bin_ns=BIN_NS, pulse_fwhm_ns=FWHM_NS, start_ns=-4.0)
     depths = np.array([0.35, 0.6, 2.0, 4.0])
     glass = drawn(detector, np.zeros(4), 3000, 2500)
     counts = drawn(detector, depths, 900, 0) + glass

@@ -60,7 +60,7 @@ fn besides(command: &str, argument: &str) -> &'static str {
         ("replay", "checks_json") => "--engine gate --checks report",
         ("timing", "plot") => "--mismatch 0.05",
         ("range", "calibration") => "",
-        ("range", "detector") => "--format counts",
+        ("range", "detector") => "--format counts --histograms counts.csv",
         ("range", "crosstalk") => {
             "--format counts --histograms counts.csv --bin-width-ns 1 --pulse-fwhm-ns 1"
         }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import NamedTuple
@@ -84,7 +83,7 @@ class Detector:
     """When bin 0 begins after the centre of the laser pulse has left, ns; 0 if it is not given."""
     first_of: int | None = None
     """Laser cycles of a histogram, if each counts its first event only; None if bins count every event."""
-    bin_edges_ns: Sequence[float] | None = None
+    bin_edges_ns: ArrayLike | None = None
     """In place of ``bin_ns`` and ``start_ns``: where bins begin, and the last one ends, after the centre of the laser pulse has left."""
     laser_cycles: int | None = None
     """Laser cycles of a histogram where every event counts, which a coincidence needs."""
@@ -130,7 +129,7 @@ class Detector:
         together = self.coincidence
         keys = {
             "bin_width_ns": self.bin_ns,
-            "bin_edges_ns": None if self.bin_edges_ns is None else list(self.bin_edges_ns),
+            "bin_edges_ns": None if self.bin_edges_ns is None else np.asarray(self.bin_edges_ns, np.float64).tolist(),
             "start_ns": self.start_ns,
             "pulse_fwhm_ns": self.pulse_fwhm_ns,
             "counts": "every" if self.first_of is None else "first",

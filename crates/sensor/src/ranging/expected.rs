@@ -169,6 +169,15 @@ impl Response {
         self
     }
 
+    /// The chances of bins that are not ours, without the echo of this light.
+    pub(super) fn dark_chances(&self, light: &EchoLight) -> Option<Vec<f64>> {
+        self.other_bins.as_ref()?;
+        Some(self.chances(&EchoLight {
+            signal: 0.0,
+            ..*light
+        }))
+    }
+
     /// The light of a bin that counts with `chance`, photons in a bin and laser cycle, if SPADs are ready for it and more light makes it
     /// count more.
     pub(super) fn steady_light(&self, chance: f64) -> f64 {

@@ -396,8 +396,13 @@ impl EchoFinder {
     /// Whether the window ends within an echo: its width is a guess then.
     fn is_cut(&self, corrected: &Corrected, counts: &[f64], peak_bin: usize) -> bool {
         let last = counts.len() - 1;
-        let background = corrected.light.background_per_bin * f64::from(self.scan.laser_cycles);
-        let above = |bin: usize| counts[bin] - background;
+        let cycles = f64::from(self.scan.laser_cycles);
+        let walk = self.walk_correction();
+        let dark = walk.and_then(|walk| walk.response.dark_chances(&corrected.light));
+        let above = |bin: usize| {
+            let background = corrected.light.background_per_bin;
+            counts[bin] - cycles * dark.as_ref().map_or(background, |dark| dark[bin])
+        };
         let ends_high = [0, last].map(|end| above(end) > MOST_AT_END * above(peak_bin));
         let is_inside = (-0.5..last as f64 + 0.5).contains(&corrected.light.position_bins);
         !is_inside || ends_high != [false; 2]

@@ -20,8 +20,9 @@ const STANDS_OUT: f64 = 3.0;
 impl Detector {
     /// Photons of the glass in each bin of a histogram, from the counts of so many histograms without a target; empty without any.
     pub fn measured_crosstalk(&self, sums: &[u32], histograms: u32) -> Vec<f64> {
-        if let Some(glass) = self.echoes(sums, histograms, |_| true) {
-            return glass;
+        let returns = self.returns_of_sum(sums, histograms);
+        if !returns.is_empty() && returns.iter().all(|found| found.bound_m.is_some()) {
+            return self.mean_of(&returns, histograms);
         }
         let number = f64::from(histograms.max(1));
         let cycles = self.laser_cycles.map(|cycles| number * f64::from(cycles));
@@ -60,51 +61,44 @@ impl Detector {
     }
 
     /// The same of the echoes in the sum of some histograms that are no farther away than the width of a pulse or a bin; empty where there are
-    /// none of this pulse.
+    /// none.
     pub fn fitted_crosstalk(&self, sums: &[u32], histograms: u32) -> Vec<f64> {
         let reach_s = (2.0 * self.pulse_sigma_s).max(self.bin_s());
         let reach_m = 0.5 * SPEED_OF_LIGHT_M_PER_S * reach_s;
-        let is_near = |found: &DetectedReturn| found.depth_m.abs() <= reach_m;
-        let glass = self.echoes(sums, histograms, is_near);
-        glass.unwrap_or_default()
+        let mut returns = self.returns_of_sum(sums, histograms);
+        returns.retain(|found| found.depth_m.abs() <= reach_m);
+        if returns.is_empty() {
+            return Vec::new();
+        }
+        self.mean_of(&returns, histograms)
     }
 
-    /// The mean histogram of some echoes in the sum of so many histograms; `None` where there are none, or not of this pulse.
-    fn echoes(
-        &self,
-        sums: &[u32],
-        histograms: u32,
-        is_wanted: impl Fn(&DetectedReturn) -> bool,
-    ) -> Option<Vec<f64>> {
-        let number = histograms.max(1);
+    /// The echoes in the sum of so many histograms.
+    fn returns_of_sum(&self, sums: &[u32], histograms: u32) -> Vec<DetectedReturn> {
+        let cycles = |cycles: u32| cycles.saturating_mul(histograms.max(1));
         let of_sum = Detector {
-            laser_cycles: self
-                .laser_cycles
-                .map(|cycles| cycles.saturating_mul(number)),
+            laser_cycles: self.laser_cycles.map(cycles),
             most_counts: None,
             ..self.clone()
         };
-        let every = Detector {
-            counted: Counted::Every,
-            ..self.clone()
-        };
-        let found = of_sum.returns(sums, &DepthOptions::default()).ok()?;
-        let mut wanted = found.iter().filter(|found| is_wanted(found)).peekable();
-        wanted.peek()?;
+        let returns = of_sum.returns(sums, &DepthOptions::default());
+        returns.unwrap_or_default()
+    }
+
+    /// Photons of such echoes in one of so many histograms.
+    fn mean_of(&self, echoes: &[DetectedReturn], histograms: u32) -> Vec<f64> {
         let mut light = vec![0.0; self.bins()];
-        for echo in wanted {
-            // Without a bound it is no echo of this pulse.
-            echo.bound_m?;
+        for echo in echoes {
+            let spread_m = echo.spread_m.unwrap_or(0.0);
+            let spread_s = 2.0 * spread_m / SPEED_OF_LIGHT_M_PER_S;
             let widened = Detector {
-                pulse_sigma_s: libm::hypot(
-                    self.pulse_sigma_s,
-                    2.0 * echo.spread_m.unwrap_or(0.0) / SPEED_OF_LIGHT_M_PER_S,
-                ),
-                ..every.clone()
+                pulse_sigma_s: libm::hypot(self.pulse_sigma_s, spread_s),
+                counted: Counted::Every,
+                ..self.clone()
             };
             let mean = widened.expected(&SurfaceLight {
                 depth_m: echo.depth_m,
-                photons: echo.photons / f64::from(number),
+                photons: echo.photons / f64::from(histograms.max(1)),
                 background: 0.0,
             });
             light
@@ -112,6 +106,6 @@ impl Detector {
                 .zip(mean)
                 .for_each(|(sum, mean)| *sum += mean);
         }
-        Some(light)
+        light
     }
 }
