@@ -1,10 +1,13 @@
 """Histograms of any sensor."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 
 import gdtof
 import numpy as np
 import pytest
+from conftest import Command
 
 
 BIN_NS, FWHM_NS = 0.8, 1.5
@@ -117,3 +120,14 @@ def test_a_surface_in_the_flank_of_a_glass_is_ranged() -> None:
         detector.crosstalk(counts)
     with pytest.raises(gdtof.InputError, match="crosstalk"):
         detector.range(counts, crosstalk=np.zeros(47))
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_the_command_reads_archives_of_numpy(save: Callable[..., None], tmp_path: Path, command: Command) -> None:
+    detector = tof()
+    counts = np.stack([detector.expected(depth, 900, 480) for depth in (2.0, 3.0, 4.0)]).round().astype(np.uint16)
+    file = tmp_path / "captures.npz"
+    save(file, counts=np.asfortranarray(counts), time_s=np.zeros(3))
+    words = f"range --format counts --bin-width-ns {BIN_NS} --pulse-fwhm-ns {FWHM_NS} --start-ns 2 --json --histograms"
+    zones = json.loads(command(*words.split(), file))["zones"]
+    assert [zone["returns"][0]["depth_m"] for zone in zones] == list(detector.range(counts).depth)

@@ -11,7 +11,7 @@ pub(super) enum Format {
     Tmf8820,
     /// Counts of a sensor like ours, rows x columns x bins (.npy), in the windows of a frame.json.
     Frame,
-    /// Counts of any sensor, zones x bins (.npy, .json, or text with a line for each zone), with the bins that options describe.
+    /// Counts of any sensor, zones x bins (.npy, .npz, .json, or text with a line for each zone), with the bins that options describe.
     Counts,
     /// A log of an ams TMF8820, TMF8821 or TMF8828 with lines #Raw.
     Tmf882x,

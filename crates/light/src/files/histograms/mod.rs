@@ -2,12 +2,13 @@
 //!
 //! | format | what a file is |
 //! |---|---|
-//! | table | `table.rs`: text with a line for each zone, NumPy arrays whose last axis is bins, JSON lists of lists |
+//! | table | `table.rs`: text with a line for each zone, NumPy arrays whose last axis is bins (in archives: `npz.rs`), JSON lists of lists |
 //! | TMF882x | `tmf882x.rs`: `#Raw` lines, three for each histogram, with the low, middle and high bytes of its counts |
 //! | TMF8829 | `tmf8829.rs`: JSON with a `Result_Set`, packed by gzip or not |
 //! | CNH | `cnh.rs`: lines `Agg, zone, …` of compact normalised histograms of VL53L5, VL53L7 and VL53L8 sensors |
 
 mod cnh;
+mod npz;
 mod table;
 mod tmf8829;
 mod tmf882x;

@@ -3,15 +3,17 @@
 //! | kind | counts |
 //! |---|---|
 //! | `.npy` | whole numbers of any type, floats that are whole, truth values; either order of axes |
+//! | `.npz` | the same in an archive: its only array, or the one with the name `counts` or `histograms` |
 //! | `.json` | lists of numbers, in lists of any depth; all of the innermost have as many |
 //! | text | numbers with commas, semicolons, tabs or spaces between them; a first line of words is a heading; `#` begins a remark |
 
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use femtogate::{InputError, in_words};
 use serde_json::Value;
 
+use super::npz::read_counts;
 use super::{Histograms, ZoneCounts, counts_of, cure};
 use crate::files::guarded::open_input;
 use crate::files::input::{Lines, parse_json, read_text};
@@ -21,11 +23,15 @@ use crate::files::npy::{NpyHead, Number};
 pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histograms, InputError> {
     let extension = path.extension().and_then(|extension| extension.to_str());
     let (bins, counts) = match extension {
-        Some("npy") => read_array(path, counts_per_unit)?,
+        Some("npy") => {
+            let reader = BufReader::new(open_input(path)?);
+            read_array(path, reader, counts_per_unit)?
+        }
+        Some("npz") => read_array(path, &read_counts(path)?[..], counts_per_unit)?,
         Some("json") => read_lists(path, counts_per_unit)?,
-        Some(kind @ ("npz" | "parquet" | "mat" | "h5" | "xlsx")) => {
+        Some(kind @ ("parquet" | "mat" | "h5" | "xlsx")) => {
             let message = format!(
-                "is a .{kind}, which is read from Python alone; give a .npy, a .json or a table of text"
+                "is a .{kind}, which is read from Python alone; give a .npy, a .npz, a .json or a table of text"
             );
             return Err(InputError::new(path.display(), message));
         }
@@ -134,7 +140,11 @@ fn shortened(value: &Value) -> String {
     }
 }
 
-fn read_array(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u32>), InputError> {
+fn read_array(
+    path: &Path,
+    mut reader: impl Read,
+    counts_per_unit: Option<f64>,
+) -> Result<(usize, Vec<u32>), InputError> {
     let complain = |message: String| InputError::new(path.display(), message);
     let broken = |error: &io::Error| {
         let error = in_words(error);
@@ -142,7 +152,6 @@ fn read_array(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u
             "is not a NumPy file of counts ({error}); give a .npy"
         ))
     };
-    let mut reader = BufReader::new(open_input(path)?);
     let mut head = NpyHead::read(&mut reader).map_err(|e| broken(&e))?;
     // Truth values are bytes of 0 and 1: one photon or none.
     if head.descr == "'|b1'" {
@@ -244,7 +253,7 @@ mod tests {
         assert!(said("[[1, 2], [3]]").contains("zone 1 has 1 bins"));
         assert!(said("[[1, 2], [3, null]]").contains("zone 1 has `null` in bin 1"));
         assert!(said("{\"a\": [1, 2]}").contains("not a list"));
-        assert!(read("a.npz", b"PK").unwrap_err().contains("from Python"));
+        assert!(read("a.h5", b"PK").unwrap_err().contains("from Python"));
     }
 
     #[test]
