@@ -88,7 +88,7 @@ fn local_stop_lies_within_static_timing(scenario: &Scenario, earlier: Time) -> T
     Ok(())
 }
 
-/// The next start value opens its window so many steps later.
+/// The next start value opens its window `steps` steps later.
 fn a_start_value_more_is_later(scenario: &Scenario, steps: usize) -> TestCaseResult {
     let law = scenario.law();
     let later = steps * scenario.config.step_periods;
@@ -107,7 +107,7 @@ fn a_start_value_more_is_later(scenario: &Scenario, steps: usize) -> TestCaseRes
     Ok(())
 }
 
-/// Each photon counts so many times at most.
+/// Each photon counts `times` times at most.
 fn photons_count_at_most(scenario: &Scenario, times: usize) -> TestCaseResult {
     let law = scenario.law();
     let counts = gates(scenario)?;

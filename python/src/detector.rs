@@ -47,7 +47,7 @@ pub(crate) fn detector_file(path: std::path::PathBuf) -> PyResult<String> {
     Ok(serde_json::to_string(&description).expect("numbers and words"))
 }
 
-/// Photons of a cover glass in each bin of all zones, from the sums of so many histograms; see `gdtof.Detector.crosstalk`.
+/// Photons of a cover glass in each bin of all zones, from the sums of `histograms` histograms; see `gdtof.Detector.crosstalk`.
 #[pyfunction]
 pub(crate) fn detector_crosstalk<'py>(
     py: Python<'py>,

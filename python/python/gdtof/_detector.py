@@ -50,6 +50,13 @@ class Agreement(NamedTuple):
     """Chance that counts of the expected light deviate at least as much. Below 0.001 the counts are of other light, or counted wrong."""
 
 
+def _plain(number: object) -> object:
+    """A number of NumPy as one of JSON."""
+    if isinstance(number, np.generic):
+        return number.item()
+    raise InputError(f"detector: {number!r} is no number; give one")
+
+
 class Coincidence(NamedTuple):
     """SPADs that fire together make an event. The output of a SPAD is high for a time after a photon."""
 
@@ -137,8 +144,7 @@ class Detector:
             "most_counts": self.most_counts,
             "coincidence": None if together is None else Coincidence(*together)._asdict(),
         }
-        # Numbers of NumPy are none of JSON.
-        return self.bins, json.dumps(keys, default=lambda number: number.item())
+        return self.bins, json.dumps(keys, default=_plain)
 
     def _zones(self, counts: ArrayLike) -> tuple[NDArray[np.uint32], tuple[int, ...]]:
         numbers = whole("counts", counts)

@@ -19,7 +19,7 @@ pub(super) fn light(
     (histograms, kept): (&Histograms, Range<usize>),
     detectors: &[Detector],
 ) -> Result<Vec<Vec<f64>>, InputError> {
-    // All captures have a detector, and the glass is as far from each.
+    // The pulse leaves at nearly the same time in all captures.
     let detector = &detectors[0];
     if detector.coincidence.is_some() {
         let message = "is not known from SPADs that fire together; leave it out";

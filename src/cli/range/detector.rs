@@ -34,7 +34,7 @@ pub(super) fn description(args: &RangeArgs) -> Result<DetectorDescription, Input
     Ok(described)
 }
 
-/// The detector of a histogram with so many bins.
+/// The detector of a histogram with `bins` bins.
 ///
 /// # Errors
 /// What is missing, or cannot be.

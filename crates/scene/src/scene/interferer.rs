@@ -101,9 +101,10 @@ impl Interferer {
         let is_within = libm::atan2(level.x, forward).abs() <= half_width
             && libm::atan2(down, forward).abs() <= half_height;
         let solid_angle_sr = 4.0 * libm::asin(libm::sin(half_width) * libm::sin(half_height));
-        match is_within {
-            true => self.pulse_energy_uj * 1e-6 / solid_angle_sr,
-            false => 0.0,
+        if is_within {
+            self.pulse_energy_uj * 1e-6 / solid_angle_sr
+        } else {
+            0.0
         }
     }
 

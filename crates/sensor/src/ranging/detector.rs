@@ -1,7 +1,7 @@
 //! Depths from the histograms of any sensor: how long its bins are, and which events they count.
 //!
 //! ```text
-//!   an event      a photon, or the photon with which so many SPADs fire together
+//!   an event      a photon, or the photon with which k SPADs fire together
 //!   every event   a bin counts each event that comes in it                 counts are Poisson numbers
 //!   first event   a laser cycle counts its first event, in one bin         later bins see what is left (pile-up)
 //! ```
@@ -139,7 +139,7 @@ impl NoReturn {
 }
 
 impl Detector {
-    /// Edges of so many bins of `bin_s` seconds, the first of which begins at `begins_s`.
+    /// Edges of equal bins of `bin_s` seconds, the first of which begins at `begins_s`, s.
     pub fn equal_edges_s(bins: usize, begins_s: f64, bin_s: f64) -> Vec<f64> {
         let edge_s = |edge| begins_s + edge as f64 * bin_s;
         (0..=bins).map(edge_s).collect()
@@ -208,15 +208,17 @@ impl Detector {
         options: &DepthOptions,
     ) -> Result<Vec<DetectedReturn>, NoReturn> {
         debug_assert_eq!(counts.len(), self.bins());
-        let laser_cycles = self.parts_of_cycles(counts);
+        let all_parts = self.parts_of_cycles(counts);
         let bin_s = self.bin_s();
-        let response = self.response(laser_cycles);
+        let law = self.law(all_parts);
+        let response = self.response(&law);
+        let dark = (self.counted == Counted::First || self.has_unlike_bins())
+            .then(|| dark_counts(&law, &response, counts, all_parts));
         let finder =
-            EchoFinder::of_response(response, bin_s, (laser_cycles, self.most_counts), options);
-        let sighting = if self.counted == Counted::Every && !self.has_unlike_bins() {
-            finder.find(counts)
-        } else {
-            finder.find_over(counts, &self.dark_counts(counts, laser_cycles))
+            EchoFinder::of_response(response, bin_s, (all_parts, self.most_counts), options);
+        let sighting = match dark {
+            Some(dark) => finder.find_over(counts, &dark),
+            None => finder.find(counts),
         };
         let sighting = sighting.ok_or(NoReturn::NoSignificantPeak)?;
         if !sighting.is_significant {
@@ -226,7 +228,6 @@ impl Detector {
             return Err(NoReturn::Saturated);
         }
         let to_m = 0.5 * SPEED_OF_LIGHT_M_PER_S;
-        let law = self.law(laser_cycles);
         let place_m = |position_bins: f64| {
             let (bins, _) = law.time(position_bins);
             to_m * (self.edges_s[0] + (bins + 0.5) * bin_s)
@@ -248,7 +249,7 @@ impl Detector {
             bound_m: first_bound_m,
             spread_m: first_bound_m.and(spread_bins).map(spread_m),
             photons: match sighting.light {
-                Some(light) => light.signal * f64::from(laser_cycles),
+                Some(light) => light.signal * f64::from(all_parts),
                 None => sighting.peak.signal_counts,
             },
             confidence: sighting.confidence,
@@ -258,7 +259,7 @@ impl Detector {
             depth_m: place_m(other.position_bins),
             bound_m: bound_m(other.position_bins, other.bound_bins),
             spread_m: other.spread_bins.map(spread_m),
-            photons: other.photons * f64::from(laser_cycles),
+            photons: other.photons * f64::from(all_parts),
             confidence: other.confidence,
         });
         Ok(std::iter::once(first).chain(others).collect())
@@ -310,44 +311,42 @@ impl Detector {
         }
     }
 
-    fn response(&self, all_parts: u32) -> Response {
-        Response::of_other_bins(self.pulse_sigma_s / self.bin_s(), self.law(all_parts))
+    fn response(&self, law: &OtherBins) -> Response {
+        Response::of_other_bins(self.pulse_sigma_s / self.bin_s(), law.clone())
     }
+}
 
-    /// Counts that bins would have without an echo, with the background of most bins. Laser cycles whose first event came before a bin
-    /// do not count there.
-    fn dark_counts(&self, counts: &[u32], all_parts: u32) -> Vec<f64> {
-        let response = self.response(all_parts);
-        let law = self.law(all_parts);
-        let cycles = f64::from(all_parts) / law.parts;
-        let mut left = cycles;
-        let open = counts.iter().map(|&count| {
-            let open = left.max(1e-3 * cycles);
-            if law.first_only {
-                left -= f64::from(count);
-            }
-            open
-        });
-        let open: Vec<f64> = open.collect();
-        let background = |(bin, &count): (usize, &u32)| {
-            let length = law.edges[bin + 1] - law.edges[bin];
-            let known = law.known.get(bin).map_or(0.0, |known| known / law.parts);
-            let chance = f64::from(count) / (open[bin] * law.parts);
-            (law.steady_light(chance / length) - known / length).max(0.0)
-        };
-        let levels: Vec<f64> = counts.iter().enumerate().map(background).collect();
-        // Half a count in all bins at least, so that none is impossible.
-        let least = law.steady_light(0.5 / (counts.len() as f64 * f64::from(all_parts)));
-        let dark = law.dark_events(&response, median(levels.iter()).max(least));
-        let counted = |(open, events): (&f64, f64)| {
-            if law.first_only {
-                open * -libm::expm1(-events)
-            } else {
-                open * events
-            }
-        };
-        open.iter().zip(dark).map(counted).collect()
-    }
+/// Counts that bins would have without an echo, with the background of most bins. Laser cycles whose first event came before a bin
+/// do not count there.
+fn dark_counts(law: &OtherBins, response: &Response, counts: &[u32], all_parts: u32) -> Vec<f64> {
+    let cycles = f64::from(all_parts) / law.parts;
+    let mut left = cycles;
+    let open = counts.iter().map(|&count| {
+        let open = left.max(1e-3 * cycles);
+        if law.first_only {
+            left -= f64::from(count);
+        }
+        open
+    });
+    let open: Vec<f64> = open.collect();
+    let background = |(bin, &count): (usize, &u32)| {
+        let length = law.edges[bin + 1] - law.edges[bin];
+        let known = law.known.get(bin).map_or(0.0, |known| known / law.parts);
+        let chance = f64::from(count) / (open[bin] * law.parts);
+        (law.steady_light(chance / length) - known / length).max(0.0)
+    };
+    let levels: Vec<f64> = counts.iter().enumerate().map(background).collect();
+    // Half a count in all bins at least, so that none is impossible.
+    let least = law.steady_light(0.5 / (counts.len() as f64 * f64::from(all_parts)));
+    let dark = law.dark_events(response, median(levels.iter()).max(least));
+    let counted = |(open, events): (&f64, f64)| {
+        if law.first_only {
+            open * -libm::expm1(-events)
+        } else {
+            open * events
+        }
+    };
+    open.iter().zip(dark).map(counted).collect()
 }
 
 #[cfg(test)]

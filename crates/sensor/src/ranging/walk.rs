@@ -393,9 +393,10 @@ impl WalkCorrection {
         sorted.sort_by(f64::total_cmp);
         let few = sorted[sorted.len() / 3];
         // Where nothing counts, the background is some tenth of what would show.
-        let begin = match few >= 1.0 {
-            true => self.response.steady_light(few / cycles),
-            false => 0.1 * self.response.steady_light(0.3 / cycles),
+        let begin = if few >= 1.0 {
+            self.response.steady_light(few / cycles)
+        } else {
+            0.1 * self.response.steady_light(0.3 / cycles)
         };
         // No count in a bin allows three.
         [begin, self.response.steady_light((few + 3.0) / cycles)]

@@ -39,7 +39,7 @@ fn drawn_pixels(
     vec((any::<u16>(), photons), pixels)
 }
 
-/// Scenarios of arrays with so many rows and columns of these sensors and photons. Start values reach one whose window never opens.
+/// Scenarios of arrays of these sensors and photons, with numbers of rows and columns from these ranges. Start values reach one whose window never opens.
 ///
 /// Shrinks towards one short laser cycle, then a simple sensor, then few macropixels with low start values and few photons.
 ///

@@ -38,7 +38,7 @@ pub enum PropertyFailure {
     },
 }
 
-/// Holds a property to so many scenarios. The smallest failing one is written to `folder` as [`write_failing_case`] does.
+/// Holds a property to `cases` scenarios. The smallest failing one is written to `folder` as [`write_failing_case`] does.
 ///
 /// Scenarios are new ones in each run, unless the environment has a PROPTEST_RNG_SEED. [`check_property_from`] always draws the same ones.
 ///

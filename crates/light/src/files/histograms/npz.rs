@@ -45,16 +45,16 @@ pub(super) fn read_counts(path: &Path) -> Result<Vec<u8>, InputError> {
     let members = members(&archive)
         .ok_or_else(|| complain("is no archive of NumPy; give a .npz or a .npy".into()))?;
     let is_counts = |member: &&Member| COUNTS.contains(&member.name.as_str());
-    let named = members.iter().find(is_counts);
-    let member = match (named, &members[..]) {
-        (Some(named), _) => named,
-        (None, [only]) => only,
-        (None, []) => return Err(complain("has no array; give a .npz with counts".into())),
-        (None, several) => {
+    let named: Vec<&Member> = members.iter().filter(is_counts).collect();
+    let member = match (&named[..], &members[..]) {
+        ([named], _) => named,
+        ([], [only]) => only,
+        (_, []) => return Err(complain("has no array; give a .npz with counts".into())),
+        (_, several) => {
             let names: Vec<&str> = several.iter().map(|member| &member.name[..]).collect();
             let names = names.join(", ");
             return Err(complain(format!(
-                "has the arrays {names}; name the one with the counts `counts`"
+                "has the arrays {names}; name only the one with the counts `counts`"
             )));
         }
     };
@@ -206,7 +206,12 @@ mod tests {
             assert_eq!(read(&archive(&named, is_packed)), Ok(vec![1, 2, 3, 4]));
             let others = [("a.npy", other.clone()), ("b.npy", counts.clone())];
             let said = read(&archive(&others, is_packed)).unwrap_err();
-            assert!(said.contains("has the arrays a, b; name the one"), "{said}");
+            assert!(said.contains("has the arrays a, b; name only"), "{said}");
+            let both = [
+                ("counts.npy", other.clone()),
+                ("histograms.npy", counts.clone()),
+            ];
+            assert!(read(&archive(&both, is_packed)).is_err());
         }
         assert!(
             read(&archive(&[], false))

@@ -30,11 +30,13 @@ use crate::photon::{
     SpadEvent, SpadRows,
 };
 use crate::units::Time;
+use cycle_window::CycleWindow;
 use spacing::Spacing;
 use tile::Tile;
 use whole::ByWindow;
 
 mod bright;
+mod cycle_window;
 mod settling;
 mod side_by_side;
 mod spacing;
@@ -55,7 +57,7 @@ pub(super) struct Counting<'a> {
     /// Photons of parts of the light that are kept by window.
     layers: Vec<ByWindow>,
     past: PastDraws,
-    /// Codes of all photons drawn for the group that do not breed. Photons are known by their index here.
+    /// Codes of all photons drawn for the group that cause no others. Photons are known by their index here.
     codes: Codes,
     scratch: Scratch,
     /// Where the codes of `plain.previous` and `plain.carried` begin.
@@ -163,7 +165,7 @@ const LITTLE: f64 = 2.0;
 /// The same with afterpulses or crosstalk: 26 Mcounts/s and 1 signal photon 83 and 91, 26 and 3 218 and 159 (2.7 and 4.7 photons).
 const LITTLE_WITH_SECONDARIES: f64 = 3.0;
 
-/// Which part of a light of one layer breeds, if one does.
+/// Which part of a light of one layer causes other avalanches, if one does.
 const BREEDING: usize = 1;
 
 /// One macropixel.
@@ -171,7 +173,7 @@ struct Pixel<'p> {
     sight: &'p Sight,
     /// All parts of the light.
     parts: &'p [PixelStream<'p>],
-    /// The first of them, which does not breed.
+    /// The first of them, which causes no other avalanches.
     light: &'p PixelStream<'p>,
     /// The photons that do, where there is but one layer.
     breeding: Option<&'p PixelStream<'p>>,
@@ -318,7 +320,7 @@ impl<'a> Counting<'a> {
         (pixel.hits, pixel.work)
     }
 
-    /// Encodes all photons that the windows of a group may see and that do not breed; returns how many codes there are.
+    /// Encodes all photons that the windows of a group may see and that cause no others; returns how many codes there are.
     fn encode(&mut self, pixel: &mut Pixel<'_>, cycles: u32) -> usize {
         self.codes.clear();
         let [own, previous] = &mut pixel.wanted;
@@ -421,11 +423,11 @@ impl<'a> Counting<'a> {
     }
 
     /// The window of a laser cycle.
-    fn window<'w>(&self, sight: &'w Sight, laser_cycle: u32) -> Placed<'w>
+    fn window<'w>(&self, sight: &'w Sight, laser_cycle: u32) -> CycleWindow<'w>
     where
         'a: 'w,
     {
-        Placed {
+        CycleWindow {
             engine: self.engine,
             sight,
             laser_cycle,
@@ -478,64 +480,5 @@ fn in_draw(light: &PixelStream<'_>, draw: &Draw, at: usize) -> i64 {
             let word = draw.words()[row][block];
             light.slots().time_fs(draw.slots()[block], word)
         }
-    }
-}
-
-/// The window of one laser cycle.
-struct Placed<'w> {
-    engine: &'w Window,
-    sight: &'w Sight,
-    laser_cycle: u32,
-    /// When the laser cycle starts, which all times are counted with.
-    start: Time,
-}
-
-impl Placed<'_> {
-    /// From when on pulses are wanted.
-    fn wanted_from(&self) -> Time {
-        self.start + Time::from_fs(self.sight.first_fs - ROUNDING_FS)
-    }
-
-    /// When the last bin is over for certain.
-    fn until(&self) -> Time {
-        self.start + Time::from_fs(self.sight.until_fs)
-    }
-
-    /// Whether a time is within the window.
-    fn is_seen(&self, time: Time) -> bool {
-        let is_inside = self.sight.rows.are_around((time - self.start).as_fs());
-        is_inside.unwrap_or_else(|| self.row_of(time).is_some())
-    }
-
-    /// How many photons are within the window.
-    fn count_seen(&self, photons: &[Photon]) -> usize {
-        let [first_fs, .., end_fs] = *self.sight.rows.edges_fs() else {
-            return 0;
-        };
-        let mut seen = 0;
-        for photon in photons {
-            let time_fs = (photon.time - self.start).as_fs();
-            let is_near = (time_fs - first_fs).abs() <= ROUNDING_FS
-                || (time_fs - end_fs).abs() <= ROUNDING_FS;
-            let is_seen = if is_near {
-                self.is_seen(photon.time)
-            } else {
-                first_fs <= time_fs && time_fs < end_fs
-            };
-            seen += usize::from(is_seen);
-        }
-        seen
-    }
-
-    /// Bin + 1 of a time, if it is within the window.
-    fn row_of(&self, time: Time) -> Option<usize> {
-        let time = time - self.start;
-        if let Some(row) = self.sight.rows.row_of(time.as_fs()) {
-            return Some(row).filter(|&row| row > 0);
-        }
-        let (law, cycle) = (&self.engine.law, i64::from(self.laser_cycle));
-        let pulse = self.engine.exposure.stop(cycle) + time;
-        let bin = law.bin_of(&self.sight.window, cycle, pulse)?;
-        Some(bin + 1)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   measured   counts without a target ─► echoes of the pulse ─► their mean histogram
-//!                                         └─ no such echoes: light of each bin (Coates), less the background, where it stands out
+//!                                         └─ no such echoes: light of each bin (Coates), less the background, where it exceeds that
 //!   fitted     sum of captures ─► echoes ─► those at nearly no distance ─► their mean histogram
 //! ```
 //!
@@ -14,11 +14,12 @@ use crate::ranging::DepthOptions;
 use crate::ranging::peak::median;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-/// Standard deviations by which a bin must stand out of the background.
+/// Standard deviations by which a bin must exceed the background.
 const STANDS_OUT: f64 = 3.0;
 
 impl Detector {
-    /// Photons of the glass in each bin of a histogram, from the counts of so many histograms without a target; empty without any.
+    /// Photons of the glass in each bin of a histogram, from `sums`, the counts of all `histograms` without a
+    /// target; empty without any light.
     pub fn measured_crosstalk(&self, sums: &[u32], histograms: u32) -> Vec<f64> {
         let returns = self.returns_of_sum(sums, histograms);
         if !returns.is_empty() && returns.iter().all(|found| found.bound_m.is_some()) {
@@ -73,7 +74,7 @@ impl Detector {
         self.mean_of(&returns, histograms)
     }
 
-    /// The echoes in the sum of so many histograms.
+    /// The echoes in the sum of some histograms.
     fn returns_of_sum(&self, sums: &[u32], histograms: u32) -> Vec<DetectedReturn> {
         let cycles = |cycles: u32| cycles.saturating_mul(histograms.max(1));
         let of_sum = Detector {
@@ -85,7 +86,7 @@ impl Detector {
         returns.unwrap_or_default()
     }
 
-    /// Photons of such echoes in one of so many histograms.
+    /// Photons in each bin of one histogram, if the sum of all has these echoes.
     fn mean_of(&self, echoes: &[DetectedReturn], histograms: u32) -> Vec<f64> {
         let mut light = vec![0.0; self.bins()];
         for echo in echoes {

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Coincidence, Counted, Detector};
 
-/// A bin may be so many times as long or short as the mean bin: chosen. Of more unequal ones the search for peaks would see little.
+/// The longest bin over the mean one, and the mean one over the shortest: chosen. The search for peaks would see little in more unequal ones.
 const MOST_UNEQUAL: f64 = 4.0;
 
 /// A detector in the words of its user; what is missing has its default, or is asked for.
@@ -49,7 +49,7 @@ pub struct DescribedCoincidence {
     pub spads: u32,
     /// Within this time.
     pub within_ns: f64,
-    /// Of so many.
+    /// SPADs in all.
     pub of: u32,
 }
 
@@ -64,7 +64,7 @@ pub struct BadDetector {
 }
 
 impl DetectorDescription {
-    /// The detector with so many bins.
+    /// The detector with `bins` bins.
     ///
     /// # Errors
     /// What is missing, or cannot be.

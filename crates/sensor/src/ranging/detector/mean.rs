@@ -34,13 +34,14 @@ pub struct Agreement {
 }
 
 impl Detector {
-    /// The mean of each bin (`ranging/expected/other_bins` has the formulas). A pulse is no shorter than a fiftieth of a bin.
+    /// The mean count of each bin in all laser cycles (`ranging/expected/other_bins` has the formulas). A pulse is no shorter than a fiftieth
+    /// of a bin.
     pub fn expected(&self, light: &SurfaceLight) -> Vec<f64> {
         let cycles = self.laser_cycles.unwrap_or(1);
         let law = self.law(cycles);
         let (bin_s, all) = (self.bin_s(), f64::from(cycles));
         let flight_s = 2.0 * light.depth_m / SPEED_OF_LIGHT_M_PER_S;
-        let response = self.response(cycles);
+        let response = self.response(&law);
         let chances = response.chances(&EchoLight {
             position_bins: law.position((flight_s - self.edges_s[0]) / bin_s - 0.5),
             signal: light.photons / all,

@@ -30,7 +30,7 @@ pub(in crate::ranging) struct FiringTogether {
     pub(in crate::ranging) least: u32,
     /// Within this time, mean bins.
     pub(in crate::ranging) within_bins: f64,
-    /// Of so many, on which light comes evenly.
+    /// SPADs in all, on which light comes evenly.
     pub(in crate::ranging) of_spads: u32,
 }
 
@@ -217,7 +217,7 @@ impl FiringTogether {
         let spads = f64::from(self.of_spads);
         let mean = window.value.max(0.0) / spads;
         let (quiet, fired) = (libm::exp(-mean), -libm::expm1(-mean));
-        // So many of the other SPADs had a photon, and the rest with the photon's own had none.
+        // `others` of the other SPADs had a photon. The rest and the photon's own had none.
         let (others, still) = (self.least - 1, self.of_spads + 1 - self.least);
         let of_others = Self::exactly(self.of_spads - 1, others, (fired, quiet));
         let chance = of_others * quiet;
@@ -237,7 +237,7 @@ impl FiringTogether {
         completes * too_few.recip()
     }
 
-    /// The chance that so many of some SPADs had a photon, each with a chance of its own.
+    /// The chance that `number` of `spads` SPADs had a photon: each has had one with the chance `fired`, and none with `quiet`.
     fn exactly(spads: u32, number: u32, (fired, quiet): (f64, f64)) -> f64 {
         let ways = (0..number).fold(1.0, |ways, n| {
             ways * f64::from(spads - n) / f64::from(n + 1)

@@ -8,7 +8,7 @@ use std::ops::Range;
 use smallvec::SmallVec;
 
 use super::super::sight::ROUNDING_FS;
-use super::{Counting, Pixel, Placed};
+use super::{Counting, CycleWindow, Pixel};
 use crate::chip::MOST_SPADS;
 use crate::photon::{ListedEchoes, Photon, PhotonStream, PixelStream, TILE, sort_photons};
 use crate::units::Time;
@@ -245,7 +245,7 @@ impl Counting<'_> {
         &self,
         light: &PixelStream<'_>,
         from: Time,
-        window: &Placed<'_>,
+        window: &CycleWindow<'_>,
     ) -> impl Iterator<Item = u32> + use<> {
         let within_fs = (from - window.start).as_fs()..window.sight.until_fs;
         let cycles = self.stream.config().laser_cycles;
@@ -257,7 +257,12 @@ impl Counting<'_> {
     }
 
     /// Where photons have to be known from: `from` or before it, and before any ordered echo that is seen.
-    fn beginning_before(&self, pixel: &Pixel<'_>, from: Time, window: &Placed<'_>) -> Beginning {
+    fn beginning_before(
+        &self,
+        pixel: &Pixel<'_>,
+        from: Time,
+        window: &CycleWindow<'_>,
+    ) -> Beginning {
         let echo_from = Time::from_fs(pixel.light.echo_fs().start);
         let mut from = from.max(Time::ZERO);
         loop {
@@ -283,7 +288,7 @@ impl Counting<'_> {
         pixel: &Pixel<'_>,
         part: usize,
         begin: Beginning,
-        window: &Placed<'_>,
+        window: &CycleWindow<'_>,
     ) {
         let since = begin.time.map_or(begin, |time| {
             let time = time - self.stream.config().spads.reach();
@@ -298,7 +303,7 @@ impl Counting<'_> {
         pixel: &Pixel<'_>,
         part: usize,
         begin: Beginning,
-        window: &Placed<'_>,
+        window: &CycleWindow<'_>,
     ) {
         let light = &pixel.parts[part];
         let (laser_cycles, until) = (self.stream.config().laser_cycles, window.until());

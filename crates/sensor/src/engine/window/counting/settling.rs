@@ -106,7 +106,7 @@ impl Counting<'_> {
             let spad = left.trailing_zeros() as u8;
             left &= left - 1;
             if !self.settle_spad(pixel, laser_cycle, spad) {
-                // Photons that breed did not matter to the window so far, but may when it is looked back.
+                // Photons that cause others did not matter to the window so far, but may when it is looked back.
                 pixel.work = work;
                 self.fired[..=pixel.hits.len()].fill(0);
                 let photons = self.breeding.of(laser_cycle..laser_cycle + 1).iter();
@@ -191,7 +191,7 @@ impl Counting<'_> {
         Some([1; 2])
     }
 
-    /// Settles the photons of one SPAD among those `together`. Returns whether it did: not where it takes a look back and photons may breed.
+    /// Settles the photons of one SPAD among those `together`. Returns whether it did: not where it takes a look back and photons may cause others.
     fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) -> bool {
         let window = self.window(pixel.sight, laser_cycle);
         let bins = pixel.hits.len();

@@ -5,7 +5,7 @@
 
 use super::bright::Beginning;
 use super::tile::{FRACTION_BITS, Layout, count_rows};
-use super::{Counting, Pixel, Placed};
+use super::{Counting, CycleWindow, Pixel};
 use crate::engine::window::codes::SPADS;
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::photon::{DeadTimeLaw, TILE, spad_of};
@@ -19,7 +19,7 @@ impl Counting<'_> {
         let last_cycle = config.laser_cycles.checked_sub(1)?;
         let is_alike = config.spads.dead_time_spread == 0.0;
         let is_packed = self.stream.spads() == SPADS && light.is_alone && is_alike;
-        // Where one avalanche in a hundred causes another, so many laser cycles would be counted one by one that all take less time.
+        // Where one avalanche in a hundred causes another, counting side by side leaves many laser cycles to be counted alone, and takes longer.
         if !is_packed || light.has_listed_echo() || pixel.has_secondaries() {
             return None;
         }
@@ -145,7 +145,7 @@ impl Counting<'_> {
             if !layout.has_clk_bins {
                 std::mem::swap(&mut self.events, &mut tile.pulses[lane]);
                 self.events.sort_unstable();
-                let window = Placed {
+                let window = CycleWindow {
                     start: Time::ZERO,
                     ..self.window(pixel.sight, cycle(lane))
                 };

@@ -11,7 +11,7 @@
 
 use std::cell::Cell;
 
-use super::{Counting, Drawn, Pixel, Placed};
+use super::{Counting, CycleWindow, Drawn, Pixel};
 use crate::engine::window::echo_rows::Passed;
 use crate::engine::window::row_ranks::RowRanks;
 use crate::engine::window::sight::ROUNDING_FS;
@@ -184,7 +184,7 @@ impl Tabling<'_> {
     }
 
     /// The row of a photon in the window of a laser cycle.
-    fn exact_row(&self, window: &Placed<'_>, time_fs: i64) -> usize {
+    fn exact_row(&self, window: &CycleWindow<'_>, time_fs: i64) -> usize {
         let edges_fs = &self.layout.edges_fs;
         if let Some(bin) = window.row_of(window.start + Time::from_fs(time_fs)) {
             self.layout.before + bin

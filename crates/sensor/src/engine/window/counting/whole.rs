@@ -3,7 +3,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Counting, Pixel, Placed};
+use super::{Counting, CycleWindow, Pixel};
 use crate::chip::Tdc;
 use crate::engine::window::past::Past;
 use crate::engine::window::sight::{ROUNDING_FS, Spans};
@@ -168,7 +168,7 @@ impl Counting<'_> {
     }
 
     /// Counts the `events` of one laser cycle. Returns how many are in its window.
-    pub(super) fn count_events(&mut self, pixel: &mut Pixel<'_>, window: &Placed<'_>) -> u64 {
+    pub(super) fn count_events(&mut self, pixel: &mut Pixel<'_>, window: &CycleWindow<'_>) -> u64 {
         self.placed.clear();
         self.placed.extend(self.events.iter().map(|event| {
             let row = window.row_of(event.time).unwrap_or(0);
@@ -206,7 +206,7 @@ impl Counting<'_> {
 
     /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
     /// rising edges in the window of a laser cycle, and perhaps some before.
-    pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, window: &Placed<'_>, spads: u64) {
+    pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, window: &CycleWindow<'_>, spads: u64) {
         let (wanted_from, until) = (window.wanted_from(), window.until());
         let past = |part| pixel.spans(part).past(self.stream, window.laser_cycle);
         let mut pasts: SmallVec<[Past<'_>; 2]> = pixel.parts.iter().map(past).collect();

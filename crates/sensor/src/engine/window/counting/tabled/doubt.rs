@@ -1,7 +1,7 @@
 //! The SPADs that a table leaves in doubt: their photons by exact times, and by history where these depend on what came before.
 
 use super::{Tabled, Tabling};
-use crate::engine::window::counting::{Counting, Pixel, Placed};
+use crate::engine::window::counting::{Counting, CycleWindow, Pixel};
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::engine::window::table::{Places, Table, WORD};
 use crate::photon::Photon;
@@ -92,7 +92,7 @@ impl Tabling<'_> {
     }
 
     /// The photons of keys in their window.
-    fn photons(&self, window: &Placed<'_>, keys: &[u64]) -> impl Iterator<Item = Photon> {
+    fn photons(&self, window: &CycleWindow<'_>, keys: &[u64]) -> impl Iterator<Item = Photon> {
         keys.iter().map(|&key| {
             let (place, time_fs) = self.of_key(key);
             Photon::new(
@@ -222,7 +222,7 @@ impl Counting<'_> {
         &mut self,
         pixel: &mut Pixel<'_>,
         tabling: &mut Tabling<'_>,
-        window: &Placed<'_>,
+        window: &CycleWindow<'_>,
         keys: &[u64],
     ) -> bool {
         let mut pulses_fs = std::mem::take(&mut self.pulses_fs);
