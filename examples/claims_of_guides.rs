@@ -68,9 +68,10 @@ impl Kept {
             self.targets += 1;
             if let Some((range_m, sigma_m)) = map.estimate_of(pixel) {
                 let error_m = (range_m - true_m).abs();
-                let size = match error_m > 0.0 {
-                    true => error_m / sigma_m,
-                    false => 0.0,
+                let size = if error_m > 0.0 {
+                    error_m / sigma_m
+                } else {
+                    0.0
                 };
                 self.errors.push((size, error_m));
             }
@@ -96,9 +97,10 @@ fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<Kept, GuideError> {
         let now = scene.at(now_s);
         let truth = GroundTruth::render(&now, SIZE, SIZE);
         let past = |number: usize| past(scene, now_s - FRAME_S * number as f64, seed, number);
-        let earlier: Vec<PastFrame> = match looks_back {
-            true => (1..=EARLIER).rev().map(past).collect(),
-            false => Vec::new(),
+        let earlier: Vec<PastFrame> = if looks_back {
+            (1..=EARLIER).rev().map(past).collect()
+        } else {
+            Vec::new()
         };
         let input = GuideInput {
             time_s: now_s,

@@ -38,9 +38,10 @@ impl Watch {
     /// So many macropixels are done; whether to go on.
     pub(crate) fn done(&self, macropixels: usize) -> ControlFlow<()> {
         self.0.1.fetch_add(macropixels, Ordering::Relaxed);
-        match self.0.0.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        if self.0.0.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
         }
     }
 

@@ -111,9 +111,10 @@ impl Drive {
         let (give, take) = sync_channel(1);
         let theirs = watch.clone();
         let settings = move || -> Result<DriveSettings, Failure> {
-            let policy = match tracking {
-                true => WindowPolicy::for_sequences(),
-                false => WindowPolicy::default(),
+            let policy = if tracking {
+                WindowPolicy::for_sequences()
+            } else {
+                WindowPolicy::default()
             };
             let policy = request.policy(policy)?;
             let frame = request.settings_by(sensor, world, guide, &policy)?;

@@ -190,9 +190,10 @@ pub(crate) fn frame<'py>(
         .transpose()?
         .unwrap_or_default();
     let taken = run(py, progress, move |watch| {
-        let policy = match tracking {
-            true => WindowPolicy::for_sequences(),
-            false => WindowPolicy::default(),
+        let policy = if tracking {
+            WindowPolicy::for_sequences()
+        } else {
+            WindowPolicy::default()
         };
         let policy = request.policy(policy)?;
         let settings = request.settings_by(sensor, world, guide, &policy)?;

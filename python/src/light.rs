@@ -42,9 +42,10 @@ struct Arrays {
 
 impl Arrays {
     fn of(&self, pixel: usize) -> Result<PixelLight, Failure> {
-        let amount = |name: &str, value: f64| match value.is_finite() && value >= 0.0 {
-            true => Ok(value),
-            false => {
+        let amount = |name: &str, value: f64| {
+            if value.is_finite() && value >= 0.0 {
+                Ok(value)
+            } else {
                 let message =
                     format!("{value} of macropixel {pixel} is impossible; give 0 or more");
                 Err(Failure::argument(name, message))

@@ -135,9 +135,12 @@ pub(crate) fn starts_for<'py>(
         return Err(Failure::argument("sensor", message).into());
     }
     let metres = values("range_m", &range_m, &[range_m.len()?])?;
-    let starts = metres.iter().map(|&m| match m.is_finite() && m >= 0.0 {
-        true => of_start(law.start_for(Time::of_flight(m))),
-        false => -1,
+    let starts = metres.iter().map(|&m| {
+        if m.is_finite() && m >= 0.0 {
+            of_start(law.start_for(Time::of_flight(m)))
+        } else {
+            -1
+        }
     });
     Ok(PyArray1::from_vec(py, starts.collect()))
 }

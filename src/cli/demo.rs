@@ -94,12 +94,11 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         let message = format!("{} is impossible; give 1 to 200", args.calibration_step_ps);
         return Err(InputError::new("--calibration-step-ps", message).into());
     }
-    let guide = match args.guide.is_empty() {
-        true => None,
-        false => {
-            let texts = args.guide.iter().map(String::as_str);
-            Some(options::parse_all(texts, "--guide")?)
-        }
+    let guide = if args.guide.is_empty() {
+        None
+    } else {
+        let texts = args.guide.iter().map(String::as_str);
+        Some(options::parse_all(texts, "--guide")?)
     };
     let name = args
         .demo

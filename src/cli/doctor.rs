@@ -60,9 +60,10 @@ pub(super) fn run(args: &DoctorArgs) -> anyhow::Result<()> {
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         target: format!("{} {}", std::env::consts::ARCH, std::env::consts::OS),
-        built: match cfg!(debug_assertions) {
-            true => "without optimisation; give --release for speed",
-            false => "for release",
+        built: if cfg!(debug_assertions) {
+            "without optimisation; give --release for speed"
+        } else {
+            "for release"
         },
         vectors: vectors(),
         threads: rayon::current_num_threads(),

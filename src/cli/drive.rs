@@ -143,9 +143,10 @@ struct Configuration<'a> {
 pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     let scene_args = args.scene.or_file(args.world);
     let (sensor, scene) = scene_args.read()?;
-    let policy = match args.tracking {
-        true => WindowPolicy::for_sequences(),
-        false => WindowPolicy::default(),
+    let policy = if args.tracking {
+        WindowPolicy::for_sequences()
+    } else {
+        WindowPolicy::default()
     };
     let asked = &args.exposure;
     let request = asked.request();
@@ -203,9 +204,10 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     };
     let mut recording = Recording::begin(results.staging(), &settings, args.frames)?;
     let mcap = results.staging().join("drive.mcap");
-    let mut foxglove = match args.mcap {
-        true => Some(Foxglove::begin(&mcap, &settings)?),
-        false => None,
+    let mut foxglove = if args.mcap {
+        Some(Foxglove::begin(&mcap, &settings)?)
+    } else {
+        None
     };
     let first = Instant::now();
     let progress = progress(

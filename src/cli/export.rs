@@ -97,9 +97,10 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         &stimuli.starts,
         &stimuli.pulses(),
     );
-    let plan = match args.readout {
-        true => plan.with_readout(),
-        false => plan,
+    let plan = if args.readout {
+        plan.with_readout()
+    } else {
+        plan
     };
     let timing = args.sdf.as_ref().map(|path| {
         let netlist = Netlist::elaborate(&array::circuit(&stimuli.sensor));

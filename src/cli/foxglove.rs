@@ -181,9 +181,10 @@ fn base64(bytes: &[u8]) -> String {
         let of = |at: usize| u32::from(chunk.get(at).copied().unwrap_or(0));
         let word = of(0) << 16 | of(1) << 8 | of(2);
         for letter in 0..4 {
-            text.push(match letter <= chunk.len() {
-                true => LETTERS[(word >> (18 - 6 * letter)) as usize & 63] as char,
-                false => '=',
+            text.push(if letter <= chunk.len() {
+                LETTERS[(word >> (18 - 6 * letter)) as usize & 63] as char
+            } else {
+                '='
             });
         }
     }

@@ -232,9 +232,10 @@ fn chart(settings: &ParetoSettings, summaries: &[Summary]) -> Chart {
 
 /// What stands above the table.
 fn head(args: &ParetoArgs, settings: &ParetoSettings, cells: usize) -> String {
-    let gate = match args.no_gate {
-        true => String::new(),
-        false => format!(" (gate level: {})", settings.laser_cycles.min(GATE_CYCLES)),
+    let gate = if args.no_gate {
+        String::new()
+    } else {
+        format!(" (gate level: {})", settings.laser_cycles.min(GATE_CYCLES))
     };
     format!(
         "{cells} walls, {} macropixels each, {} laser cycles of {} CLK periods{gate}; median / worst wall\n\n",

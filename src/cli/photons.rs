@@ -328,9 +328,10 @@ impl Report {
             [file] => file.name.clone(),
             files => format!("{} files such as {}", files.len(), files[0].name),
         };
-        let more = match has_starts {
-            true => ", light.csv, inits.csv, sensor.toml",
-            false => ", light.csv",
+        let more = if has_starts {
+            ", light.csv, inits.csv, sensor.toml"
+        } else {
+            ", light.csv"
         };
         let mut text = format!("{table}{files}{more} and photons.json in {folder}\n");
         if has_starts && args.format == PulseFormat::Csv {

@@ -313,9 +313,10 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
             s.threshold,
         )
     };
-    let name = match of(sensor) == of(&usual) {
-        true => "The QuantIC4x4",
-        false => "The sensor itself",
+    let name = if of(sensor) == of(&usual) {
+        "The QuantIC4x4"
+    } else {
+        "The sensor itself"
     };
     text + &match &found.own {
         Own::OnFront(_) => format!("{name} is on the front.\n\n"),
@@ -391,9 +392,10 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
     let front = || found.front.iter().map(|one| &one.point);
     let powers = front().map(|point| point.power_w);
     let [least, most] = [f64::min, f64::max].map(|of| powers.clone().reduce(of).unwrap_or(1.0));
-    let power = match most > 10.0 * least {
-        true => Axis::log("mean laser power (mW)"),
-        false => Axis::linear("mean laser power (mW)"),
+    let power = if most > 10.0 * least {
+        Axis::log("mean laser power (mW)")
+    } else {
+        Axis::linear("mean laser power (mW)")
     };
     let area = Axis::linear(format!("macropixel ({area})"));
     let mut chart = Chart::new(title, area, power);
@@ -402,9 +404,10 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
         let [from, to] = [pair[0] * goal.fps, pair[1] * goal.fps];
         let within = |point: &&Point| (from..to).contains(&point.fps.max(goal.fps));
         let points: Vec<(f64, f64)> = front().filter(within).map(at).collect();
-        let name = match to.is_finite() {
-            true => format!("{from:.0} to {to:.0} frames/s"),
-            false => format!("{from:.0} frames/s and more"),
+        let name = if to.is_finite() {
+            format!("{from:.0} to {to:.0} frames/s")
+        } else {
+            format!("{from:.0} frames/s and more")
         };
         if !points.is_empty() {
             chart = chart.points(name, points);

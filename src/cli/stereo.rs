@@ -288,9 +288,10 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         writeln!(w)
     })?;
     notes(set.commit([&args.left, &args.right])?);
-    match args.json {
-        true => say_json(&report)?,
-        false => tell(table(args, &report))?,
+    if args.json {
+        say_json(&report)?
+    } else {
+        tell(table(args, &report))?
     }
     Ok(())
 }
@@ -334,9 +335,12 @@ pub(super) fn disparity_picture(
     path: &Path,
 ) -> Result<(), InputError> {
     let cells: Vec<Cell> = (map.values_px().iter())
-        .map(|&d| match d.is_nan() {
-            true => Cell::Category(0),
-            false => Cell::Depth(d),
+        .map(|&d| {
+            if d.is_nan() {
+                Cell::Category(0)
+            } else {
+                Cell::Depth(d)
+            }
         })
         .collect();
     let known = || map.values_px().iter().copied().filter(|d| !d.is_nan());
@@ -347,9 +351,10 @@ pub(super) fn disparity_picture(
         title: "Disparity",
         cols: map.width(),
         cells: &cells,
-        range_m: match least < most {
-            true => (most, least),
-            false => (first + matcher.disparities as f32, first),
+        range_m: if least < most {
+            (most, least)
+        } else {
+            (first + matcher.disparities as f32, first)
         },
         unit: "px",
         categories: &["none"],

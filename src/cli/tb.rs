@@ -116,9 +116,10 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
             ))?;
         }
     }
-    Ok(match results().all(|result| result.passed) {
-        true => ExitCode::SUCCESS,
-        false => ExitCode::FAILURE,
+    Ok(if results().all(|result| result.passed) {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
     })
 }
 

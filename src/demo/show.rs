@@ -156,12 +156,11 @@ impl Show {
         let pixels: Vec<usize> = self.targets[0].pixels(&frame.truth).collect();
         let every = pixels.len().div_ceil(COMPARED).max(1);
         let pixels: Vec<usize> = pixels.into_iter().step_by(every).collect();
-        match pixels.is_empty() {
-            true => Ok(Vec::new()),
-            false => {
-                let seed = self.settings.frame.seed;
-                schemes::compare(demonstrator, &world, &frame.guide, &pixels, seed)
-            }
+        if pixels.is_empty() {
+            Ok(Vec::new())
+        } else {
+            let seed = self.settings.frame.seed;
+            schemes::compare(demonstrator, &world, &frame.guide, &pixels, seed)
         }
     }
 

@@ -250,17 +250,16 @@ impl LightSource {
         let layout = self.exposure.layout;
         let (mut own, mut count) = (Vec::new(), 0);
         let photons = self.stream.pixel_pulses_while(pixel, light, |events| {
-            let some = match layout.is_full() {
-                true => events,
-                false => {
-                    own.clear();
-                    let spad = |event: &SpadEvent| {
-                        let spad = layout.spad_at(event.spad)?;
-                        Some(SpadEvent::new(event.time, spad))
-                    };
-                    own.extend(events.iter().filter_map(spad));
-                    &own
-                }
+            let some = if layout.is_full() {
+                events
+            } else {
+                own.clear();
+                let spad = |event: &SpadEvent| {
+                    let spad = layout.spad_at(event.spad)?;
+                    Some(SpadEvent::new(event.time, spad))
+                };
+                own.extend(events.iter().filter_map(spad));
+                &own
             };
             count += some.len() as u64;
             pulses(some)

@@ -105,9 +105,10 @@ impl PulseOptions {
             }
             PulseFormat::Vcd => {
                 let cycles = f64::from(source.exposure.laser_cycles);
-                let clk = match self.has_clk {
-                    true => 2.0 * source.exposure.clk.as_hz() * end.as_s(),
-                    false => 0.0,
+                let clk = if self.has_clk {
+                    2.0 * source.exposure.clk.as_hz() * end.as_s()
+                } else {
+                    0.0
                 };
                 let steady = (clk + 2.0 * cycles) * pixels.len() as f64;
                 (2.0 * pulses + steady) * (digits + CHANGE_BYTES - 13.0)
@@ -127,9 +128,10 @@ pub fn write_pulses(
     options: &PulseOptions,
     done: impl Fn(usize) + Sync,
 ) -> Result<WrittenPulses, InputError> {
-    match options.format.is_one_file() {
-        true => write_array(folder, source, pixels, options.format, done),
-        false => write_each(folder, source, pixels, options, done),
+    if options.format.is_one_file() {
+        write_array(folder, source, pixels, options.format, done)
+    } else {
+        write_each(folder, source, pixels, options, done)
     }
 }
 

@@ -168,9 +168,10 @@ impl Seen {
             };
             let middle = (low + (share * f64::from(gap)) as u32).clamp(low + 1, high - 1);
             let at_middle = excess(middle);
-            match at_middle <= 0.0 {
-                true => (high, at_high) = (middle, at_middle),
-                false => (low, at_low) = (middle, at_middle),
+            if at_middle <= 0.0 {
+                (high, at_high) = (middle, at_middle);
+            } else {
+                (low, at_low) = (middle, at_middle);
             }
         }
         Some(high)

@@ -175,9 +175,10 @@ impl Problem {
             ));
         }
         let verdict = TimingVerdict::of(config, &Silicon::of(config), (0, 0));
-        match verdict.is_met() {
-            true => Ok(()),
-            false => Err(verdict.to_string()),
+        if verdict.is_met() {
+            Ok(())
+        } else {
+            Err(verdict.to_string())
         }
     }
 
@@ -279,9 +280,10 @@ impl Problem {
             |bits: &usize| counts <= self.most_counts[*bits] || u64::from(laser_cycles) < 1 << bits;
         let bin_bits = window.bin_bits.or((1..=MOST_BIN_BITS).find(holds));
         let bin_bits = bin_bits.unwrap_or(MOST_BIN_BITS);
-        let counts = match holds(&bin_bits) {
-            true => counts.min(self.most_counts[bin_bits]) / self.most_counts[bin_bits],
-            false => counts / self.most_counts[bin_bits],
+        let counts = if holds(&bin_bits) {
+            counts.min(self.most_counts[bin_bits]) / self.most_counts[bin_bits]
+        } else {
+            counts / self.most_counts[bin_bits]
         };
         let mut design = Design {
             bins: window.bins,

@@ -42,10 +42,13 @@ const PNG_STEPS: f32 = 256.0;
 /// # Errors
 /// When the file cannot be written.
 pub(crate) fn write_depth_png(path: &Path, cols: usize, depths: &[f32]) -> Result<(), InputError> {
-    let step = |depth: &f32| match depth.is_finite() {
-        // A depth is never 0, which would be none.
-        true => (depth * PNG_STEPS).round().clamp(1.0, 65_535.0) as u16,
-        false => 0,
+    let step = |depth: &f32| {
+        if depth.is_finite() {
+            // A depth is never 0, which would be none.
+            (depth * PNG_STEPS).round().clamp(1.0, 65_535.0) as u16
+        } else {
+            0
+        }
     };
     let bytes: Vec<u8> = depths
         .iter()

@@ -328,9 +328,10 @@ fn short(value: f64) -> String {
     } else {
         let decimals = (3 - libm::log10(magnitude).floor() as i32).max(0) as usize;
         let text = format!("{value:.decimals$}");
-        match text.contains('.') {
-            true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-            false => text,
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
         }
     }
 }

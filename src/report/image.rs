@@ -166,9 +166,10 @@ impl DepthMap<'_> {
             entries.push((category, text, left, top));
             left += entry_px + 2 * MARGIN_PX;
         }
-        match entries.is_empty() {
-            true => (entries, 0),
-            false => (entries, top + LEGEND_LINE_PX + MARGIN_PX / 2),
+        if entries.is_empty() {
+            (entries, 0)
+        } else {
+            (entries, top + LEGEND_LINE_PX + MARGIN_PX / 2)
         }
     }
 }

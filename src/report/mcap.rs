@@ -133,9 +133,10 @@ impl<W: Write> Mcap<W> {
         time_ns: u64,
         messages: &[(usize, serde_json::Value)],
     ) -> io::Result<()> {
-        let mut records = match self.chunks.is_empty() {
-            true => self.definitions(),
-            false => Vec::new(),
+        let mut records = if self.chunks.is_empty() {
+            self.definitions()
+        } else {
+            Vec::new()
         };
         let mut indices = Vec::new();
         for (channel, json) in messages {

@@ -145,11 +145,15 @@ impl Row {
                 _ => return Verdict::NotShown,
             }
         }
-        match agrees {
-            true if self.input.is_some() => Verdict::Given,
-            true => Verdict::Agrees,
-            false if self.known_difference.is_some() => Verdict::Differs,
-            false => Verdict::Fails,
+        match (
+            agrees,
+            self.input.is_some(),
+            self.known_difference.is_some(),
+        ) {
+            (true, true, _) => Verdict::Given,
+            (true, false, _) => Verdict::Agrees,
+            (false, _, true) => Verdict::Differs,
+            (false, _, false) => Verdict::Fails,
         }
     }
 

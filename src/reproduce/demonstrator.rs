@@ -105,9 +105,10 @@ const SWEEPS: u64 = 4;
 
 /// σ of the sweep's last point, m.
 fn sigma_m(otherwise: Otherwise) -> f64 {
-    let demonstrator = match otherwise.alike {
-        true => Demonstrator::of(delay_line::calibrated_alike()),
-        false => chain(),
+    let demonstrator = if otherwise.alike {
+        Demonstrator::of(delay_line::calibrated_alike())
+    } else {
+        chain()
     };
     let change = |frame: &mut FrameSettings| {
         if otherwise.centred {

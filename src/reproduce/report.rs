@@ -84,9 +84,10 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
         || rayon::join(claims, tables),
         || rayon::join(figures, measurements),
     );
-    let slips = match claims.len() == CLAIMS.len() {
-        true => THESIS.slips.clone(),
-        false => Vec::new(),
+    let slips = if claims.len() == CLAIMS.len() {
+        THESIS.slips.clone()
+    } else {
+        Vec::new()
     };
     Report {
         claims,

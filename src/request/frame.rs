@@ -102,9 +102,10 @@ impl FrameRequest {
             FrameError::Input(InputError::new(self.spelling.name(key), message))
         };
         let sensor = as_warm_as(&scene, sensor)?;
-        let (sensor, stop_periods) = match self.bins_from_guide {
-            true => self.with_bins(sensor, &scene, &*guide, policy)?,
-            false => (sensor, self.stop_periods),
+        let (sensor, stop_periods) = if self.bins_from_guide {
+            self.with_bins(sensor, &scene, &*guide, policy)?
+        } else {
+            (sensor, self.stop_periods)
         };
         let exposure = guided_exposure(&sensor, stop_periods, self.laser_cycles, self.spelling)?;
         if let Some(metres) = self.tolerance_m.filter(|m| !(m.is_finite() && *m >= 0.0)) {

@@ -106,9 +106,10 @@ impl Sources {
                 return Err(InputError::new(option, message));
             };
             // A path in a sensor file is relative to that.
-            let file = match sensor.folder == Path::new("") {
-                true => PathBuf::from(file),
-                false => std::path::absolute(file).unwrap_or_else(|_| file.into()),
+            let file = if sensor.folder == Path::new("") {
+                PathBuf::from(file)
+            } else {
+                std::path::absolute(file).unwrap_or_else(|_| file.into())
             };
             let file = file.to_string_lossy().into_owned();
             sensor.set_value(&format!("{name}_block"), file.into(), &option);

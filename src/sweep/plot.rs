@@ -200,9 +200,12 @@ impl<'a> Drawing<'a> {
         });
         // A hundred to one is more than equal steps show.
         let y_is_log = least > 0.0 && most > 100.0 * least;
-        let axis = |column: &Column, is_log| match is_log {
-            true => Axis::log(column.label()),
-            false => Axis::linear(column.label()),
+        let axis = |column: &Column, is_log| {
+            if is_log {
+                Axis::log(column.label())
+            } else {
+                Axis::linear(column.label())
+            }
         };
         let title = format!("{}: {} over {}", study.name, self.y.name, self.x.name);
         let axes = (axis(&self.x, self.is_log), axis(&self.y, y_is_log));

@@ -176,10 +176,7 @@ impl<'a> Subject<'a> {
     /// Files are relative to the study's folder; what is none there goes by its name.
     fn placed(&self, name: &str) -> PathBuf {
         let path = self.study.folder().join(name);
-        match path.exists() {
-            true => path,
-            false => name.into(),
-        }
+        if path.exists() { path } else { name.into() }
     }
 
     fn world(&self, sources: Sources) -> Result<World, InputError> {

@@ -37,9 +37,10 @@ impl Span {
             _ if self.is_log => from * libm::exp(share * libm::log(to / from)),
             _ => from + share * (to - from),
         };
-        match self.is_whole {
-            true => Value::Integer(number.round() as i64),
-            false => Value::Float(number),
+        if self.is_whole {
+            Value::Integer(number.round() as i64)
+        } else {
+            Value::Float(number)
         }
     }
 }

@@ -13,9 +13,10 @@ use crate::units::{Time, TimeOfFlight};
 
 /// The law of a macropixel by its number, given that of the first.
 pub(super) fn own_law(law: &WindowLaw, pixel: usize) -> Cow<'_, WindowLaw> {
-    match law.sensor().has_own_laws() {
-        true => Cow::Owned(law.of_macropixel(pixel as u32)),
-        false => Cow::Borrowed(law),
+    if law.sensor().has_own_laws() {
+        Cow::Owned(law.of_macropixel(pixel as u32))
+    } else {
+        Cow::Borrowed(law)
     }
 }
 

@@ -427,9 +427,10 @@ impl Plan<'_> {
 /// # Errors
 /// When it is not.
 pub(super) fn go_on(answer: impl Answer) -> Result<(), EngineError> {
-    match answer.stops() {
-        true => Err(EngineError::Stopped),
-        false => Ok(()),
+    if answer.stops() {
+        Err(EngineError::Stopped)
+    } else {
+        Ok(())
     }
 }
 

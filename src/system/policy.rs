@@ -100,9 +100,10 @@ fn sigmas_holding(share: f64) -> f64 {
     let (mut low, mut high) = (0.0, 40.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        match 1.0 - 2.0 * normal_above(middle) < share {
-            true => low = middle,
-            false => high = middle,
+        if 1.0 - 2.0 * normal_above(middle) < share {
+            low = middle
+        } else {
+            high = middle
         }
     }
     0.5 * (low + high)
@@ -304,12 +305,13 @@ impl<'p> Pointing<'p> {
             .policy
             .patience
             .is_some_and(|most| memory.missed >= most);
-        match in_doubt || has_missed {
-            true if memory.missed > 0 => (
+        if (in_doubt || has_missed) && memory.missed > 0 {
+            (
                 self.most_likely(memory, Some((range_m, sigma_m))),
                 Why::Stepped,
-            ),
-            _ => (aimed, guided),
+            )
+        } else {
+            (aimed, guided)
         }
     }
 
@@ -372,9 +374,12 @@ impl<'p> Pointing<'p> {
             Some((start, left[seen.end] - left[seen.start]))
         });
         // Of equal ones the nearest; sums of equal chances differ by rounding.
-        let best = chances.reduce(|best, other| match other.1 > best.1 * (1.0 + 1e-9) {
-            true => other,
-            false => best,
+        let best = chances.reduce(|best, other| {
+            if other.1 > best.1 * (1.0 + 1e-9) {
+                other
+            } else {
+                best
+            }
         });
         best.map(|(start, _)| start)
     }

@@ -201,14 +201,15 @@ impl Circumstances<'_> {
             let asked = format!(
                 "threshold = {threshold} asks for {wanted} {threshold} SPADs in one CLK period, which"
             );
-            return match chance > 0.0 {
-                true => format!(
+            return if chance > 0.0 {
+                format!(
                     "{asked} a bin of the brightest echo has with a probability of {chance:.1e} in each of {cycles} laser cycles; give event_type = \"greater\" and a lower threshold"
-                ),
-                false => format!(
+                )
+            } else {
+                format!(
                     "{asked} the {} of a macropixel never have; give event_type = \"greater\" and a lower threshold",
                     self.sensor.spads()
-                ),
+                )
             };
         }
         let brightest = self.brightest(NoDepth::NoSignificantPeak);

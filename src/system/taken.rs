@@ -217,14 +217,13 @@ impl TakenFrame {
         let pixel = row * sensor.cols + col;
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
         // What a calibration made of the guide's estimate is not known here, nor are other guides.
-        let given = match self.is_plain {
-            false => self.pixels[pixel].start,
-            true => {
-                let input = GuideInput::still(scene, rows, cols, *seed);
-                let guide = BehaviouralStereo.estimate(&input);
-                let guide = guide.map_err(|why| InputError::new(&self.source, why.to_string()))?;
-                Aims::new(sensor, exposure, None).start_of(pixel, guide.range_m[pixel])
-            }
+        let given = if !self.is_plain {
+            self.pixels[pixel].start
+        } else {
+            let input = GuideInput::still(scene, rows, cols, *seed);
+            let guide = BehaviouralStereo.estimate(&input);
+            let guide = guide.map_err(|why| InputError::new(&self.source, why.to_string()))?;
+            Aims::new(sensor, exposure, None).start_of(pixel, guide.range_m[pixel])
         };
         if given != self.pixels[pixel].start {
             let shown = |start: Option<u16>| start.map_or("none".to_owned(), |s| s.to_string());

@@ -28,9 +28,10 @@ pub(super) struct LastWorld {
 pub(super) fn worlds(scene: &Scene, exposure_s: Range<f64>, segments: u32) -> Vec<Scene> {
     let length_s = (exposure_s.end - exposure_s.start) / f64::from(segments);
     let middle_s = |n: u32| exposure_s.start + (f64::from(n) + 0.5) * length_s;
-    match scene.is_still() {
-        true => vec![scene.at(0.0)],
-        false => (0..segments).map(|n| scene.at(middle_s(n))).collect(),
+    if scene.is_still() {
+        vec![scene.at(0.0)]
+    } else {
+        (0..segments).map(|n| scene.at(middle_s(n))).collect()
     }
 }
 

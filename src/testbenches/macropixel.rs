@@ -322,9 +322,10 @@ fn view(
     // Where few bins leave room, the view shows all of them and opens on the windows, so that a value has its place in a CLK
     // period; else the first, the middle and the last bin, in a whole laser cycle.
     let has_room = config.bins <= 8;
-    let pins = match has_room {
-        true => &["CLK", "STOP"][..],
-        false => &["CLK", "STOP", "ENABLE"],
+    let pins = if has_room {
+        &["CLK", "STOP"][..]
+    } else {
+        &["CLK", "STOP", "ENABLE"]
     };
     let pins = pins.iter().copied().map(Entry::binary);
     let mut groups = vec![Group::new("Global signals", pins)];
@@ -344,9 +345,10 @@ fn view(
             Entry::decimal(Probe::Events.path(&pixel)),
             Entry::binary(Probe::Select.path(&pixel)),
         ];
-        let bins = match has_room {
-            true => (0..config.bins).collect(),
-            false => vec![0, config.bins / 2, config.bins - 1],
+        let bins = if has_room {
+            (0..config.bins).collect()
+        } else {
+            vec![0, config.bins / 2, config.bins - 1]
         };
         let bins = bins.into_iter();
         let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));

@@ -84,9 +84,10 @@ fn cases() -> impl Strategy<Value = Case> {
             |(config, (stop_periods, other), laser_cycles, start, photons)| {
                 // Without memory a counter should come round with STOP.
                 let wider = usize::from(config.tap == Tap::Borrow);
-                let stop_periods = match config.p_counter.row().has_memory {
-                    false if other > 0 => 1 << (config.counter_bits + wider),
-                    _ => stop_periods,
+                let stop_periods = if !config.p_counter.row().has_memory && other > 0 {
+                    1 << (config.counter_bits + wider)
+                } else {
+                    stop_periods
                 };
                 let exposure = Exposure::new(&config, stop_periods, laser_cycles);
                 let end_fs = exposure.end().as_fs() as f64;

@@ -40,11 +40,12 @@ pub fn libraries() -> Vec<(&'static str, String)> {
 fn text_of(path: &Path) -> Option<String> {
     let bytes = std::fs::read(path).ok()?;
     let mut text = String::new();
-    match path.extension().is_some_and(|e| e == "gz") {
-        true => flate2::read::GzDecoder::new(&bytes[..])
+    if path.extension().is_some_and(|e| e == "gz") {
+        flate2::read::GzDecoder::new(&bytes[..])
             .read_to_string(&mut text)
-            .ok()?,
-        false => (&bytes[..]).read_to_string(&mut text).ok()?,
+            .ok()?
+    } else {
+        (&bytes[..]).read_to_string(&mut text).ok()?
     };
     Some(text)
 }
@@ -53,9 +54,10 @@ fn text_of(path: &Path) -> Option<String> {
 pub fn chips() -> Vec<SensorConfig> {
     let of = |p_counter: PCounter| SensorConfig {
         p_counter,
-        after_borrow: match p_counter.row().has_memory {
-            true => AfterBorrow::Hold,
-            false => AfterBorrow::Wrap,
+        after_borrow: if p_counter.row().has_memory {
+            AfterBorrow::Hold
+        } else {
+            AfterBorrow::Wrap
         },
         ..SensorConfig::default()
     };

@@ -72,9 +72,10 @@ type Checks = BTreeMap<Key, Found>;
 fn keep(checks: &mut Checks, key: Key, found: Found) {
     let is_late = matches!(key.0, "setup" | "recovery");
     let worst = checks.entry(key).or_insert(found);
-    worst.arrival = match is_late {
-        true => worst.arrival.max(found.arrival),
-        false => worst.arrival.min(found.arrival),
+    worst.arrival = if is_late {
+        worst.arrival.max(found.arrival)
+    } else {
+        worst.arrival.min(found.arrival)
     };
     if found.need > worst.need {
         *worst = Found {
@@ -365,9 +366,10 @@ fn of_every_endpoint_of_a_macropixel() {
                 let within =
                     |apart: f64| apart.abs() <= f64::max(1e-3, 5e-3 * theirs.arrival.abs());
                 let apart = ours.need - theirs.need;
-                let late = match is_data {
-                    true => ours.arrival - theirs.arrival,
-                    false => 0.0,
+                let late = if is_data {
+                    ours.arrival - theirs.arrival
+                } else {
+                    0.0
                 };
                 let more = if within(apart) && within(late) {
                     0

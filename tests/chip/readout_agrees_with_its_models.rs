@@ -67,10 +67,7 @@ proptest! {
         let mut now = SETTLING * 2;
         let mut expected = vec![(now, model)];
         for is_clocked in steps {
-            match is_clocked {
-                true => model.clock(),
-                false => model.reset(),
-            }
+            if is_clocked { model.clock() } else { model.reset() }
             bench.pulse(now + HALF, HALF, if is_clocked { "READ_CLK" } else { "READ_RESET" });
             now += HALF * 2;
             expected.push((now, model));

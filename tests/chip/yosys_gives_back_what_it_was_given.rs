@@ -177,9 +177,12 @@ fn other_blocks_do_the_same() {
             .filter(|(d, _)| *d == guided_dtof::netlist::Direction::Input)
             .flat_map(|(_, s)| {
                 let width = s.width();
-                (0..width).map(move |bit| match s.is_bus {
-                    true => format!("{}[{bit}]", s.name),
-                    false => s.name.clone(),
+                (0..width).map(move |bit| {
+                    if s.is_bus {
+                        format!("{}[{bit}]", s.name)
+                    } else {
+                        s.name.clone()
+                    }
                 })
             })
             .collect();

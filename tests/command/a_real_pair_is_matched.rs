@@ -18,9 +18,10 @@ disparities = 32
 ";
 
 fn disparity_px(x: usize, y: usize) -> usize {
-    match (50..110).contains(&x) && (40..80).contains(&y) {
-        true => 20,
-        false => 10,
+    if (50..110).contains(&x) && (40..80).contains(&y) {
+        20
+    } else {
+        10
     }
 }
 

@@ -67,12 +67,13 @@ fn temporaries(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn bytes_in(path: &Path) -> u64 {
-    match path.is_dir() {
-        true => names(path)
+    if path.is_dir() {
+        names(path)
             .iter()
             .map(|name| bytes_in(&path.join(name)))
-            .sum(),
-        false => path.metadata().map_or(0, |m| m.len()),
+            .sum()
+    } else {
+        path.metadata().map_or(0, |m| m.len())
     }
 }
 

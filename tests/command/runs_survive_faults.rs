@@ -167,14 +167,15 @@ fn check(out: &Path, whole: &[&BTreeMap<String, Vec<u8>>], what: &str) -> bool {
         )
     });
     let hashes: Vec<(String, String)> = hashes.collect();
-    match manifest["complete"] == true {
-        true => assert_eq!(hashes, now, "{what}"),
-        false => assert!(
+    if manifest["complete"] == true {
+        assert_eq!(hashes, now, "{what}")
+    } else {
+        assert!(
             hashes
                 .iter()
                 .all(|file| now.contains(file) || before.contains(file)),
             "{what}: {hashes:?}"
-        ),
+        )
     }
     manifest["complete"] == false
 }
@@ -341,11 +342,10 @@ fn a_folder_that_may_not_be_written_is_refused_and_untouched() {
         mode(0o555);
         let is_root = fs::write(out.join("probe"), "").is_ok();
         let _ = fs::remove_file(out.join("probe"));
-        let setup = match is_root {
-            true => {
-                "set -- --reuid=65534 --regid=65534 --clear-groups \"$0\" \"$@\"; exec setpriv \"$@\""
-            }
-            false => "true",
+        let setup = if is_root {
+            "set -- --reuid=65534 --regid=65534 --clear-groups \"$0\" \"$@\"; exec setpriv \"$@\""
+        } else {
+            "true"
         };
         let done = limited(here.path(), setup, &words(run, 2));
         mode(0o755);

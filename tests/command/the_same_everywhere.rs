@@ -68,9 +68,12 @@ fn program() -> Vec<String> {
     let built = env!("CARGO_BIN_EXE_gdtof");
     let given = std::env::var("GDTOF_PROGRAM").unwrap_or_else(|_| built.to_owned());
     // Runs have a working folder of their own.
-    let place = |word: &str| match Path::new(word).exists() {
-        true => std::path::absolute(word).unwrap().display().to_string(),
-        false => word.to_owned(),
+    let place = |word: &str| {
+        if Path::new(word).exists() {
+            std::path::absolute(word).unwrap().display().to_string()
+        } else {
+            word.to_owned()
+        }
     };
     given.split(' ').map(place).collect()
 }

@@ -84,9 +84,10 @@ fn law(config: &SensorConfig, exposure: &Exposure, lines: &[Vec<f64>]) -> Window
         .iter()
         .map(|taps| taps.iter().map(tap).collect())
         .collect();
-    match lines.is_empty() {
-        true => law,
-        false => law.with_taps(&lines),
+    if lines.is_empty() {
+        law
+    } else {
+        law.with_taps(&lines)
     }
 }
 

@@ -30,9 +30,10 @@ fn any(random: &mut StdRng) -> (Scenario, Silicon) {
         clk_skew_ps: random.random_range(0.0..=200.0),
         delay_sigma: random.random_range(0.0..0.2),
         delay_seed: random.random(),
-        mode: match random.random_bool(0.2) {
-            true => Mode::Conventional,
-            false => Mode::Guided,
+        mode: if random.random_bool(0.2) {
+            Mode::Conventional
+        } else {
+            Mode::Guided
         },
         ..config
     };

@@ -44,9 +44,10 @@ fn compare(first_seed: u64, cases: u32, most: usize, expected: impl Fn(&Scenario
         // In a library's cells signals race more often: what has a tape is compared, but need not be nearly all.
         let is_of_library = !config.liberty.as_os_str().is_empty();
         let mut other = Tally::default();
-        let tally = match is_of_library {
-            true => &mut other,
-            false => &mut tallies[config.p_counter as usize],
+        let tally = if is_of_library {
+            &mut other
+        } else {
+            &mut tallies[config.p_counter as usize]
         };
         tally.ran += 1;
         let cycle = Cycle::new(config, exposure);

@@ -294,9 +294,10 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
         Some(why) => why.to_string(),
         None => format!("{} x start value + {}", config.step_periods, law.offset()),
     };
-    let codes = match law.is_plain() {
-        true => "the start value",
-        false => "a code for each start value",
+    let codes = if law.is_plain() {
+        "the start value"
+    } else {
+        "a code for each start value"
     };
     let number = |n: u64| Cell::Number(Some(n as f64), 0);
     let title = format!("P-counter: {}", block.file().display());

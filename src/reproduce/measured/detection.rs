@@ -34,10 +34,12 @@ pub(super) fn judged(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Es
     let won = |counts: &Vec<u32>| {
         let most = counts.iter().max().expect("a bin");
         let mut fullest = (0..counts.len()).filter(|&bin| counts[bin] == *most);
-        match by_lot {
-            true if counts[echo] == *most => 1.0 / fullest.count() as f64,
-            true => 0.0,
-            false => f64::from(fullest.next() == Some(echo)),
+        if !by_lot {
+            f64::from(fullest.next() == Some(echo))
+        } else if counts[echo] == *most {
+            1.0 / fullest.count() as f64
+        } else {
+            0.0
         }
     };
     share(histograms.iter().map(won).sum(), histograms.len() as f64)

@@ -58,9 +58,10 @@ impl AtRange {
 
     /// Laser cycles of zooming; `None` where a detection never succeeds.
     pub(crate) fn zooming(&self) -> Option<Estimate> {
-        match self.detections.is_empty() {
-            true => Some(self.guided),
-            false => Some(sum(&self.detecting()?, &self.guided)),
+        if self.detections.is_empty() {
+            Some(self.guided)
+        } else {
+            Some(sum(&self.detecting()?, &self.guided))
         }
     }
 

@@ -303,9 +303,12 @@ impl Trial {
             }
         }
         let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
-        let held = |n: u64| match self.wide_counters {
-            true => n as u32,
-            false => histogram::model(n, bits, overflow).into(),
+        let held = |n: u64| {
+            if self.wide_counters {
+                n as u32
+            } else {
+                histogram::model(n, bits, overflow).into()
+            }
         };
         let histograms = hits.into_iter();
         Ok(histograms

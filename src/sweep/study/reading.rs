@@ -186,9 +186,10 @@ impl Study {
         let any = !faults.is_empty();
         document.complain(faults)?;
         debug_assert!(!any);
-        let name = match head.name.is_empty() {
-            true => name.to_owned(),
-            false => head.name,
+        let name = if head.name.is_empty() {
+            name.to_owned()
+        } else {
+            head.name
         };
         // A folder is called by it.
         if name.contains(['/', '\\', '\0']) {
@@ -200,9 +201,10 @@ impl Study {
             return Err(error);
         }
         let study = Study {
-            out: match head.out.as_os_str().is_empty() {
-                true => format!("sweep-{name}").into(),
-                false => head.out,
+            out: if head.out.as_os_str().is_empty() {
+                format!("sweep-{name}").into()
+            } else {
+                head.out
             },
             name,
             kind: head.kind,

@@ -23,9 +23,10 @@ fn a_frame_that_is_no_longer_wanted_begins_no_other_batch() {
     let exposed = AtomicUsize::new(0);
     let stop_at_first = |macropixels| {
         let before = exposed.fetch_add(macropixels, Ordering::Relaxed);
-        match before + macropixels > 0 {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        if before + macropixels > 0 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
         }
     };
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();

@@ -55,9 +55,12 @@ fn share_held(guide: &GuideMap, law: &WindowLaw) -> f64 {
 /// The same of windows that open wherever they are wanted: no law's are better.
 fn share_held_at_best(guide: &GuideMap, sensor: &SensorConfig, bin_m: f64) -> f64 {
     let [window_m, step_m] = [sensor.bins, sensor.step_periods].map(|bins| bins as f64 * bin_m);
-    mean(estimates(guide).map(|(_, sigma_m)| match sigma_m > 0.0 {
-        true => share_inside(sigma_m, window_m, step_m),
-        false => 1.0,
+    mean(estimates(guide).map(|(_, sigma_m)| {
+        if sigma_m > 0.0 {
+            share_inside(sigma_m, window_m, step_m)
+        } else {
+            1.0
+        }
     }))
 }
 

@@ -166,15 +166,19 @@ impl Case<'_> {
         // What is nearly never or nearly always counted shows no spread of its own.
         let variance = |i: usize| {
             let binomial = expected[i] * (1.0 - expected[i] / cycles);
-            match saturates {
-                true => by_photons.covariance(i, i),
-                false => binomial.max(by_photons.covariance(i, i)),
+            if saturates {
+                by_photons.covariance(i, i)
+            } else {
+                binomial.max(by_photons.covariance(i, i))
             }
         };
-        let standard = |difference: f64, variance: f64, n: f64| match difference == 0.0 {
-            true => 0.0,
-            // Nor are a few counts one.
-            false => (difference.abs() - FEW_COUNTS / n).max(0.0) / (variance / n).sqrt(),
+        let standard = |difference: f64, variance: f64, n: f64| {
+            if difference == 0.0 {
+                0.0
+            } else {
+                // Nor are a few counts one.
+                (difference.abs() - FEW_COUNTS / n).max(0.0) / (variance / n).sqrt()
+            }
         };
         for (i, &expected) in expected.iter().enumerate() {
             let (photons, own) = (by_photons.mean(i), drawn.mean(i));

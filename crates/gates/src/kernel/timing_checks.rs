@@ -70,9 +70,10 @@ impl History {
 
     /// Direction of the last change.
     pub(super) fn last_edge(&self) -> Edge {
-        match self.rose_fs > self.fell_fs {
-            true => Edge::Rise,
-            false => Edge::Fall,
+        if self.rose_fs > self.fell_fs {
+            Edge::Rise
+        } else {
+            Edge::Fall
         }
     }
 }

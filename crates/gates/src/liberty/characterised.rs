@@ -287,9 +287,10 @@ fn most_load(map: &CellMap, slew_fs: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1e5);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        match buffer.stage_slew(last, slew_fs, &[[middle; 2]; MAX_OUTPUTS]) <= slew_fs {
-            true => low = middle,
-            false => high = middle,
+        if buffer.stage_slew(last, slew_fs, &[[middle; 2]; MAX_OUTPUTS]) <= slew_fs {
+            low = middle
+        } else {
+            high = middle
         }
     }
     low

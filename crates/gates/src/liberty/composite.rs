@@ -270,9 +270,10 @@ impl<'m> Composite<'m> {
                     (sum, weights) = (sum + weight * fj, weights + weight);
                     (plain, count) = (plain + fj, count + 1.0);
                 }
-                match weights > 0.0 {
-                    true => sum / weights,
-                    false => plain / f64::max(count, 1.0),
+                if weights > 0.0 {
+                    sum / weights
+                } else {
+                    plain / f64::max(count, 1.0)
                 }
             };
             for output in 0..cell.outputs.len() {
@@ -428,9 +429,10 @@ impl<'m> Composite<'m> {
                 _ => &[Control::Reset, Control::Set],
             };
             // Only setup and hold know the direction of D.
-            let edges: &[Edge] = match check.kind.concerns_data() {
-                true => &[own_edge][..],
-                false => &Edge::BOTH,
+            let edges: &[Edge] = if check.kind.concerns_data() {
+                &[own_edge][..]
+            } else {
+                &Edge::BOTH
             };
             for &control in controls {
                 for &edge in edges {

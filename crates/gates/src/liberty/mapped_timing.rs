@@ -150,13 +150,14 @@ pub fn write_constraints(
             }
         };
         // Timing analysers take the edges of the source as they are there, whatever inverts them on the way.
-        let source = match reaches(netlist, (from, Edge::Rise), leaf.input(1)) {
-            true => format!(
+        let source = if reaches(netlist, (from, Edge::Rise), leaf.input(1)) {
+            format!(
                 "-source [get_pins {{{}/{}}}]{master} -divide_by 2",
                 composite.instance_name(&path, stage),
                 composite.cell(stage).inputs[pin].name
-            ),
-            false => format!("-source {at}{master} -edges {{2 4 6}}"),
+            )
+        } else {
+            format!("-source {at}{master} -edges {{2 4 6}}")
         };
         let (before, outputs) = (
             divided.len(),

@@ -59,12 +59,13 @@ impl Requirement {
             netlist.cell_path(self.cell),
             name(self.capture),
         );
-        match self.kind.concerns_data() {
-            true => format!(
+        if self.kind.concerns_data() {
+            format!(
                 "{clock} {from} to {cell} D {}, against {clock} {to}",
                 name(self.edge)
-            ),
-            false => format!("{clock} {from} to {to} at {cell}"),
+            )
+        } else {
+            format!("{clock} {from} to {to} at {cell}")
         }
     }
 

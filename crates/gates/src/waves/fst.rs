@@ -101,9 +101,10 @@ impl<W: Write + Seek> Declare for Header<W> {
     }
 
     fn signal(&mut self, signal: &Declaration<'_>) -> io::Result<()> {
-        let name = match signal.is_bus {
-            true => format!("{} [{}:0]", signal.name, signal.width - 1),
-            false => signal.name.to_owned(),
+        let name = if signal.is_bus {
+            format!("{} [{}:0]", signal.name, signal.width - 1)
+        } else {
+            signal.name.to_owned()
         };
         let alias = signal.is_alias.then(|| self.ids[signal.variable as usize]);
         let (wire, undirected) = (FstVarType::Wire, FstVarDirection::Implicit);

@@ -89,9 +89,10 @@ impl Layout {
 fn one_word(title: &str) -> String {
     let parts = title.split(|c: char| !c.is_ascii_alphanumeric());
     let words: Vec<&str> = parts.filter(|part| !part.is_empty()).collect();
-    match words.is_empty() {
-        true => "_".to_owned(),
-        false => words.join("_"),
+    if words.is_empty() {
+        "_".to_owned()
+    } else {
+        words.join("_")
     }
 }
 

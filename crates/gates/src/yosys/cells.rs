@@ -84,14 +84,15 @@ impl<'d> Placing<'d> {
         if of.kind == "$scopeinfo" {
             return Ok(());
         }
-        match place(self, &Given { name, of, inverses })? {
-            true => Ok(()),
-            false => Err(YosysError::Cell {
+        if place(self, &Given { name, of, inverses })? {
+            Ok(())
+        } else {
+            Err(YosysError::Cell {
                 module: self.module.to_owned(),
                 cell: name.to_owned(),
                 kind: of.kind.clone(),
                 why: cure(&of.kind),
-            }),
+            })
         }
     }
 

@@ -89,9 +89,10 @@ fn bits(netlist: &Netlist, waves: &Waves) -> Vec<(String, NetId, Changes)> {
                 };
                 let mut changes: Changes = dumped[path.as_str()].iter().map(of_bit).collect();
                 changes.dedup_by_key(|change| change.1);
-                let name = match signal.is_bus {
-                    true => format!("{path}[{bit}]"),
-                    false => path.clone(),
+                let name = if signal.is_bus {
+                    format!("{path}[{bit}]")
+                } else {
+                    path.clone()
                 };
                 bits.push((name, net, changes));
             }

@@ -16,9 +16,10 @@ use super::npy::{Element, NpyHead, Number};
 pub fn read_array<T: Element>(path: &Path, shape: &[usize]) -> Result<Vec<T>, InputError> {
     let (head, mut reader) = open(path, shape, "of the sensor and its frames")?;
     let other = || io::Error::other(format!("its elements are of type {}", head.descr));
-    let numbers = match head.is_of::<T>() {
-        true => head.numbers(&mut reader).unwrap_or_else(|| Err(other())),
-        false => Err(other()),
+    let numbers = if head.is_of::<T>() {
+        head.numbers(&mut reader).unwrap_or_else(|| Err(other()))
+    } else {
+        Err(other())
     };
     let numbers = numbers.map_err(|e| broken(path, &e))?;
     Ok(numbers.into_iter().filter_map(T::of).collect())

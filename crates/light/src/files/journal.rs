@@ -197,9 +197,10 @@ impl JournalReader {
         let moved = self.reader.seek_relative(by);
         moved.map_err(|e| InputError::unreadable(&self.path, &e))?;
         self.at = begin;
-        Ok(match self.read_line()? {
-            true => text_of(&self.line),
-            false => None,
+        Ok(if self.read_line()? {
+            text_of(&self.line)
+        } else {
+            None
         })
     }
 

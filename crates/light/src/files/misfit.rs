@@ -180,9 +180,10 @@ fn wanted(expected: &str) -> (String, String) {
             let is_digit = |c: char| c.is_ascii_digit();
             let mut words = expected.split(' ');
             let of = words.find(|word| word.chars().all(is_digit));
-            let numbers = match expected.contains("f64") {
-                true => " numbers",
-                false => "",
+            let numbers = if expected.contains("f64") {
+                " numbers"
+            } else {
+                ""
             };
             let length = of.map_or(String::new(), |of| format!(" of {of}{numbers}"));
             (format!("a list{length}"), String::new())

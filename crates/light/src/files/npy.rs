@@ -267,9 +267,12 @@ impl NpyHead {
         let mut bytes = Vec::new();
         // As much as there is, however much the head promises.
         let read = reader.take(wanted as u64).read_to_end(&mut bytes);
-        let checked = read.and_then(|read| match read == wanted {
-            true => Ok(()),
-            false => Err(io::Error::from(io::ErrorKind::UnexpectedEof)),
+        let checked = read.and_then(|read| {
+            if read == wanted {
+                Ok(())
+            } else {
+                Err(io::Error::from(io::ErrorKind::UnexpectedEof))
+            }
         });
         Some(checked.map(|()| bytes.chunks_exact(width).map(number).collect()))
     }

@@ -189,12 +189,15 @@ fn read_png(reader: BufReader<File>, length: u64) -> Result<Contents, String> {
     reader.next_frame(&mut bytes).map_err(broken)?;
     let (colour, depth) = reader.output_color_type();
     let (channels, wide) = (colour.samples(), depth == png::BitDepth::Sixteen);
-    let sample = |pixel: &[u8], channel: usize| match wide {
-        true => f32::from(u16::from_be_bytes([
-            pixel[2 * channel],
-            pixel[2 * channel + 1],
-        ])),
-        false => f32::from(pixel[channel]),
+    let sample = |pixel: &[u8], channel: usize| {
+        if wide {
+            f32::from(u16::from_be_bytes([
+                pixel[2 * channel],
+                pixel[2 * channel + 1],
+            ]))
+        } else {
+            f32::from(pixel[channel])
+        }
     };
     let grey = |pixel: &[u8]| match channels {
         3 | 4 => 0.299 * sample(pixel, 0) + 0.587 * sample(pixel, 1) + 0.114 * sample(pixel, 2),
@@ -232,9 +235,12 @@ fn read_npy(mut reader: BufReader<File>) -> Result<Contents, String> {
         Number::Whole(value) => value as f32,
         Number::Float(value) => value as f32,
     };
-    let place = |at: usize| match head.is_fortran {
-        true => (at % width) * height + at / width,
-        false => at,
+    let place = |at: usize| {
+        if head.is_fortran {
+            (at % width) * height + at / width
+        } else {
+            at
+        }
     };
     Ok(Contents {
         raster: Raster {

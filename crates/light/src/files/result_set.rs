@@ -343,10 +343,13 @@ impl Switch {
         }
         let needed: BTreeSet<&str> = files.iter().map(|file| &*file.name).collect();
         for &name in ours.keys().filter(|name| !needed.contains(*name)) {
-            match exists(name) {
-                true if is_ours(name)? => switch.remove.push(name.into()),
-                true => switch.kept.push(name.into()),
-                false => {}
+            if !exists(name) {
+                continue;
+            }
+            if is_ours(name)? {
+                switch.remove.push(name.into());
+            } else {
+                switch.kept.push(name.into());
             }
         }
         Ok(switch)

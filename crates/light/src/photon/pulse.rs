@@ -190,9 +190,10 @@ impl PulseSampler {
         let product = u64::from(choice) * self.columns.len() as u64;
         let own = (product >> 32) as usize;
         let column = &self.columns[own];
-        let cell = match (product as u32) < column.threshold {
-            true => own,
-            false => column.alias as usize,
+        let cell = if (product as u32) < column.threshold {
+            own
+        } else {
+            column.alias as usize
         };
         let column = &self.columns[cell];
         let (earlier, later) = (place.min(other), place.max(other));

@@ -52,9 +52,10 @@ impl PhotonStream {
         pulses: impl FnMut(&[SpadEvent]) -> ControlFlow<()>,
     ) -> PixelPhotons {
         let parts = self.parts(pixel, light);
-        match parts[0].is_bright {
-            true => self.bright_pulses(&parts, pulses),
-            false => self.dim_pulses(&parts, pulses),
+        if parts[0].is_bright {
+            self.bright_pulses(&parts, pulses)
+        } else {
+            self.dim_pulses(&parts, pulses)
         }
     }
 
@@ -102,9 +103,10 @@ impl PhotonStream {
             }
             // Photons of the next groups come from then on.
             let next = group.first_cycle().saturating_add(group.cycles());
-            let until = match next < self.config().laser_cycles {
-                true => self.cycle_start(next) + earliest,
-                false => end,
+            let until = if next < self.config().laser_cycles {
+                self.cycle_start(next) + earliest
+            } else {
+                end
             };
             let now = photons.partition_point(|photon| photon.time < until);
             edges.clear();
@@ -147,9 +149,10 @@ impl PhotonStream {
         let mut keys = Vec::new();
         let mut from = Time::ZERO;
         for cycle in 0..config.laser_cycles {
-            let until = match cycle + 1 < config.laser_cycles {
-                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs),
-                false => end,
+            let until = if cycle + 1 < config.laser_cycles {
+                self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs)
+            } else {
+                end
             };
             // Whatever may blind a SPAD for an echo must find it.
             let may_begin =

@@ -27,9 +27,10 @@ pub fn schema(title: &str, sections: &[Section], values: &Table) -> Value {
             "properties": keys(section.keys, of),
             "additionalProperties": false,
         });
-        let table = match is_list {
-            true => json!({ "type": "array", "items": table }),
-            false => table,
+        let table = if is_list {
+            json!({ "type": "array", "items": table })
+        } else {
+            table
         };
         properties.insert(section.name.into(), table);
     }

@@ -64,9 +64,10 @@ pub fn any_periods_hz(spads: u32, avalanches_hz: f64, clk_hz: f64) -> f64 {
 
 /// 1 − (1 − x)ⁿ, with its digits where x is small.
 fn any_of(n: u32, x: f64) -> f64 {
-    match x < 0.5 {
-        true => -libm::expm1(f64::from(n) * libm::log1p(-x)),
-        false => 1.0 - (1.0 - x).powi(n as i32),
+    if x < 0.5 {
+        -libm::expm1(f64::from(n) * libm::log1p(-x))
+    } else {
+        1.0 - (1.0 - x).powi(n as i32)
     }
 }
 

@@ -29,9 +29,10 @@ pub(super) fn as_printed(signal: f64, background: f64, bins: u32) -> f64 {
 fn sum(mean_s: f64, sigma_s: f64, mean_b: f64, sigma_b: f64, bins: u32) -> f64 {
     let others = f64::from(bins) - 1.0;
     let summand = |x: f64| {
-        let ln_below = match sigma_b > 0.0 {
-            true => ln_normal_below((x - mean_b) / sigma_b),
-            false => 0.0,
+        let ln_below = if sigma_b > 0.0 {
+            ln_normal_below((x - mean_b) / sigma_b)
+        } else {
+            0.0
         };
         let z = (x - mean_s) / sigma_s;
         libm::exp(others * ln_below - 0.5 * z * z) * normal_density(0.0) / sigma_s

@@ -54,12 +54,13 @@ impl Scan {
         let most = (bins / 2).max(1);
         // 2.8 σ is the best width without bins, and rounding to them matters below some bins only.
         let about = (2.8 * pulse_sigma_bins).round().max(1.0);
-        let width = match about > 8.0 {
-            true => about.min(most as f64) as usize,
-            false => (1..=12)
+        let width = if about > 8.0 {
+            about.min(most as f64) as usize
+        } else {
+            (1..=12)
                 .max_by(|&a, &b| gain(a, pulse_sigma_bins).total_cmp(&gain(b, pulse_sigma_bins)))
                 .unwrap_or(1)
-                .min(most),
+                .min(most)
         };
         Scan {
             width,
@@ -176,9 +177,10 @@ fn least_significant(inside: u64, outside: u64, rest: u64, ln_one: f64) -> Optio
     let mut enough = (failed + reach).min(inside);
     while enough - failed > 1 {
         let middle = failed + (enough - failed) / 2;
-        match is_enough(middle) {
-            true => enough = middle,
-            false => failed = middle,
+        if is_enough(middle) {
+            enough = middle
+        } else {
+            failed = middle
         }
     }
     Some(enough)
@@ -203,9 +205,12 @@ fn at_least(least: u64, cells: u64, chance: f64) -> f64 {
 fn gain(width: usize, sigma_bins: f64) -> f64 {
     const STEPS: usize = 16;
     let half = width as f64 / 2.0;
-    let share = |off: f64| match sigma_bins > 0.0 {
-        true => normal_above((off - half) / sigma_bins) - normal_above((off + half) / sigma_bins),
-        false => 1.0,
+    let share = |off: f64| {
+        if sigma_bins > 0.0 {
+            normal_above((off - half) / sigma_bins) - normal_above((off + half) / sigma_bins)
+        } else {
+            1.0
+        }
     };
     let offs = (0..STEPS).map(|i| (i as f64 + 0.5) / (2 * STEPS) as f64);
     offs.map(share).sum::<f64>() / STEPS as f64 / (width as f64).sqrt()
@@ -269,14 +274,18 @@ mod tests {
     /// By counting all choices: Σ C(marked, x)·C(unmarked, drawn − x) / C(cells, drawn).
     fn by_counting(k: u64, marked: u64, drawn: u64, cells: u64) -> f64 {
         let choose = |n: u64, r: u64| -> f64 {
-            match r <= n {
-                true => (0..r).map(|i| (n - i) as f64 / (i + 1) as f64).product(),
-                false => 0.0,
+            if r <= n {
+                (0..r).map(|i| (n - i) as f64 / (i + 1) as f64).product()
+            } else {
+                0.0
             }
         };
-        let ways = |x: u64| match x <= drawn {
-            true => choose(marked, x) * choose(cells - marked, drawn - x),
-            false => 0.0,
+        let ways = |x: u64| {
+            if x <= drawn {
+                choose(marked, x) * choose(cells - marked, drawn - x)
+            } else {
+                0.0
+            }
         };
         (k..=marked).map(ways).sum::<f64>() / choose(cells, drawn)
     }
@@ -347,11 +356,10 @@ mod tests {
                         // One by one where a bin is nearly sure to count.
                         let counts =
                             |_: &u32| f64::from(random.next_u32()) < chance * 2f64.powi(32);
-                        match laser_cycles < 100 {
-                            true => (0..laser_cycles).filter(counts).count() as u32,
-                            false => {
-                                Poisson::new(chance * f64::from(laser_cycles)).draw(&mut random)
-                            }
+                        if laser_cycles < 100 {
+                            (0..laser_cycles).filter(counts).count() as u32
+                        } else {
+                            Poisson::new(chance * f64::from(laser_cycles)).draw(&mut random)
                         }
                     })
                     .collect();

@@ -80,9 +80,10 @@ impl IntensityStereo {
         let pixels = light.par_iter().enumerate().map(|(pixel, light)| {
             let mean = mean(light);
             let mut random = random_stream(input.seed, Purpose::Guide, pixel as u32, draws);
-            match mean < MANY {
-                true => f64::from(Poisson::new(mean).draw(&mut random)),
-                false => (mean + mean.sqrt() * normal(&mut random)).round(),
+            if mean < MANY {
+                f64::from(Poisson::new(mean).draw(&mut random))
+            } else {
+                (mean + mean.sqrt() * normal(&mut random)).round()
             }
         });
         pixels.collect()

@@ -316,9 +316,10 @@ mod tests {
                     continue;
                 };
                 let error = (range_m - hit.range_m).abs() / sigma_m;
-                match hit.normal.dot(towards).abs() > 0.5 {
-                    true => facing.push(error),
-                    false => grazing.push(error),
+                if hit.normal.dot(towards).abs() > 0.5 {
+                    facing.push(error)
+                } else {
+                    grazing.push(error)
                 }
             }
         }

@@ -142,15 +142,16 @@ fn radiances(
     let (width, height) = (crop.width as usize, crop.height as usize);
     let bounds = Bounds::of(scene, ray(crop.middle(0, 0)).origin);
     let stage = Stage::of(scene);
-    let radiance = |ray: &Ray, candidates: &_| match has_panes {
-        false => match stage.hit_of(ray, candidates) {
-            Some(hit) => {
-                let seen = surface(&stage, ray.at(hit.range_m), &hit, grain, pixel_rad);
-                seen + air(&stage, hit.range_m)
+    let radiance = |ray: &Ray, candidates: &_| {
+        if !has_panes {
+            match stage.hit_of(ray, candidates) {
+                Some(hit) => {
+                    let seen = surface(&stage, ray.at(hit.range_m), &hit, grain, pixel_rad);
+                    seen + air(&stage, hit.range_m)
+                }
+                None => SKY_REFLECTIVITY,
             }
-            None => SKY_REFLECTIVITY,
-        },
-        true => {
+        } else {
             let returns = stage.returns_of(ray, candidates);
             let surfaces = returns.surfaces.iter();
             let seen = surfaces

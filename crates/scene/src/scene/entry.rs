@@ -396,9 +396,10 @@ impl ObjectEntry {
                 self.reflectivity_file = files.reflectivity;
                 self.grey_file = files.grey;
                 self.depth_unit_m = files.unit_m;
-                self.depth_along = Some(match files.is_range {
-                    true => DepthKind::Range,
-                    false => DepthKind::Axis,
+                self.depth_along = Some(if files.is_range {
+                    DepthKind::Range
+                } else {
+                    DepthKind::Axis
                 });
                 self.focal_px = Some(files.focal_px);
                 self.principal_px = files.principal_px;

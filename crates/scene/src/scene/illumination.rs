@@ -261,9 +261,10 @@ impl Scene {
 
     /// Dark counts of a macropixel, unless its SPADs have their own, per second.
     pub(super) fn dark_hz(&self) -> f64 {
-        match self.lidar.has_spread() {
-            true => 0.0,
-            false => self.lidar.dark_counts_hz(),
+        if self.lidar.has_spread() {
+            0.0
+        } else {
+            self.lidar.dark_counts_hz()
         }
     }
 }

@@ -109,9 +109,10 @@ impl Medium {
     /// taken out of the way is replaced by airlight (Koschmieder), as bright as the sky at the horizon. Without a surface, at an infinite
     /// range, it is all of it.
     pub(crate) fn airlight(&self, range_m: f64) -> f64 {
-        match range_m.is_finite() {
-            true => 1.0 - self.transmission(range_m),
-            false => 1.0,
+        if range_m.is_finite() {
+            1.0 - self.transmission(range_m)
+        } else {
+            1.0
         }
     }
 }

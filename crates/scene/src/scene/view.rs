@@ -274,9 +274,10 @@ impl View {
         }
         for surface in &mut surfaces {
             surface.reflectivity /= surface.ray_share;
-            surface.range_m = match surface.light_share > 0.0 {
-                true => surface.range_m / surface.light_share,
-                false => self.mean_range_m(surface.object),
+            surface.range_m = if surface.light_share > 0.0 {
+                surface.range_m / surface.light_share
+            } else {
+                self.mean_range_m(surface.object)
             };
         }
         surfaces.sort_by(|a, b| b.light_share.total_cmp(&a.light_share));

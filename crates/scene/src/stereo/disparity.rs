@@ -100,9 +100,10 @@ impl DisparityMap {
                 Some(after) => is_gap(last.0, after[0].0) || after[0].1 < last.1,
                 None => gaps_end && last.0 + 1 < line.len(),
             };
-            let most = match begins && ends && !gaps_end {
-                true => (surface.len() - 1) / 2,
-                false => surface.len(),
+            let most = if begins && ends && !gaps_end {
+                (surface.len() - 1) / 2
+            } else {
+                surface.len()
             };
             let reach = |is_rim: bool| if is_rim { reach_px.min(most) } else { 0 };
             let from_first = &surface[..reach(begins)];

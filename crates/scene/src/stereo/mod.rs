@@ -67,9 +67,10 @@ mod tests {
                     .prop_map(move |(left, other, noise)| {
                         let pixels = (0..width * height).map(|i| {
                             let (x, y) = (i % width, i / width);
-                            match ((i as u32).wrapping_mul(2_654_435_761) >> 8) % 100 < noise {
-                                true => other.pixels()[i],
-                                false => left.row(y)[(x + by).min(width - 1)],
+                            if ((i as u32).wrapping_mul(2_654_435_761) >> 8) % 100 < noise {
+                                other.pixels()[i]
+                            } else {
+                                left.row(y)[(x + by).min(width - 1)]
                             }
                         });
                         let right = GreyImage::new(width, height, bits, pixels.collect()).unwrap();

@@ -254,9 +254,10 @@ impl Way {
 
 impl<'a> Sweep<'a> {
     fn new(job: &'a Job<'a>) -> Self {
-        let asides: &[isize] = match job.matcher.paths.diagonals() {
-            true => &[0, 1, -1],
-            false => &[0],
+        let asides: &[isize] = if job.matcher.paths.diagonals() {
+            &[0, 1, -1]
+        } else {
+            &[0]
         };
         Sweep {
             job,

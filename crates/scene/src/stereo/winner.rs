@@ -119,18 +119,17 @@ fn of_row_of<const LANES: usize>(
         let best = usize::from(best);
         let alone = second >= no_partner;
         let believed = alone || u64::from(second) * 100 >= u64::from(least) * enough_percent;
-        *out = match least < no_partner && believed {
-            true => {
-                let beside = (sums.get(best.wrapping_sub(1)), sums.get(best + 1));
-                let beyond = match beside {
-                    (Some(&less), Some(&more)) if less.max(more) < no_partner => {
-                        between(less, least, more)
-                    }
-                    _ => 0.0,
-                };
-                (matcher.min_disparity + best as i32) as f32 + beyond
-            }
-            false => f32::NAN,
+        *out = if least < no_partner && believed {
+            let beside = (sums.get(best.wrapping_sub(1)), sums.get(best + 1));
+            let beyond = match beside {
+                (Some(&less), Some(&more)) if less.max(more) < no_partner => {
+                    between(less, least, more)
+                }
+                _ => 0.0,
+            };
+            (matcher.min_disparity + best as i32) as f32 + beyond
+        } else {
+            f32::NAN
         };
     }
 }

@@ -219,9 +219,10 @@ impl MacropixelTiming {
         let doubt = middle((ignored_until, counts_from));
         Aim {
             edges: after.div_euclid(2 * t) + 1,
-            first: match self.counts_from_reset() {
-                true => (-(-doubt).div_euclid(2 * t)).max(0),
-                false => 1,
+            first: if self.counts_from_reset() {
+                (-(-doubt).div_euclid(2 * t)).max(0)
+            } else {
+                1
             },
         }
     }

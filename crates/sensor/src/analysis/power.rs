@@ -175,9 +175,10 @@ impl MacropixelPower {
                 let energy =
                     characterised.energy_j((&netlist, block), &library.liberty, volt, changes);
                 BlockSilicon {
-                    block: match block == scope {
-                        true => "macropixel".to_owned(),
-                        false => netlist.scopes()[block].name.clone(),
+                    block: if block == scope {
+                        "macropixel".to_owned()
+                    } else {
+                        netlist.scopes()[block].name.clone()
                     },
                     area,
                     leakage_w,

@@ -123,11 +123,10 @@ impl TimingVerdict {
         let pixel = MacropixelTiming::of(config, silicon, Limits::Kept, position);
         let library = Silicon::of(config);
         let is_library = *silicon == library;
-        let aim = match is_library {
-            true => pixel.aim(period, phase),
-            false => {
-                MacropixelTiming::of(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
-            }
+        let aim = if is_library {
+            pixel.aim(period, phase)
+        } else {
+            MacropixelTiming::of(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
         };
         let mut margins = pixel_margins(&pixel, period, phase, aim);
         margins.extend(local_margins(config, silicon));

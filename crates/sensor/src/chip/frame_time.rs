@@ -22,9 +22,10 @@ impl SensorConfig {
     /// it (thesis 4.9.5). Guide and ranging take none of it.
     pub fn frame_time(&self, exposed: Time) -> Time {
         let counted = exposed + self.readout_time();
-        match self.reset_to_load {
-            true => counted + self.load_time(),
-            false => counted.max(self.load_time()),
+        if self.reset_to_load {
+            counted + self.load_time()
+        } else {
+            counted.max(self.load_time())
         }
     }
 }

@@ -183,9 +183,10 @@ impl fmt::Display for NeverMet {
             f,
             "threshold = {threshold} with event_type = {name:?} asks for {asks} {threshold}, which {lines} can never be; give "
         )?;
-        match least == most {
-            true => write!(f, "{least}"),
-            false => write!(f, "{least} to {most}"),
+        if least == most {
+            write!(f, "{least}")
+        } else {
+            write!(f, "{least} to {most}")
         }
     }
 }

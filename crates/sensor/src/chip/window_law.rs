@@ -213,9 +213,10 @@ impl WindowLaw {
         if self.sensor.tdc.has_clk_bins() && period <= to_shift {
             let own = &self.sensor;
             let is_own = own.front_end_block.is_some() || own.metdc_block.is_some();
-            let what = match is_own || !is_clocked {
-                true => Conflict::SlowPath,
-                false => Conflict::SlowCorrelation,
+            let what = if is_own || !is_clocked {
+                Conflict::SlowPath
+            } else {
+                Conflict::SlowCorrelation
             };
             return Window::Race(Race::too_slow(what, to_shift, period));
         }

@@ -240,9 +240,10 @@ pub(super) fn has_no_delay_lines(sensor: &Sensor) -> Result<(), EngineError> {
 
 /// Whether each SPAD has a line of its own, as engines without gates take it.
 pub(super) fn has_a_line_a_spad(sensor: &Sensor) -> Result<(), EngineError> {
-    match sensor.front_end.joins() {
-        false => Ok(()),
-        true => Err(EngineError::Joined(sensor.front_end)),
+    if !sensor.front_end.joins() {
+        Ok(())
+    } else {
+        Err(EngineError::Joined(sensor.front_end))
     }
 }
 

@@ -152,14 +152,15 @@ fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), Eng
     let (brightest_hz, total_hz) =
         blinding_hz.fold((0f64, 0f64), |(most, sum), hz| (most.max(hz), sum + hz));
     let photons = total_hz * config.cycle_s() * f64::from(config.laser_cycles);
-    match photons <= MOST_BLINDING_PHOTONS {
-        true => Ok(()),
-        false => Err(EngineError::Blinding {
+    if photons <= MOST_BLINDING_PHOTONS {
+        Ok(())
+    } else {
+        Err(EngineError::Blinding {
             background_hz: brightest_hz / spads,
             most_hz,
             photons,
             most_photons: MOST_BLINDING_PHOTONS,
-        }),
+        })
     }
 }
 
@@ -176,9 +177,10 @@ fn in_batches<E: Engine + ?Sized, A: Answer>(
                 return Err(EngineError::Stopped);
             }
             let exposed = expose(batch)?;
-            match done(batch.len()).stops() {
-                true => Err(EngineError::Stopped),
-                false => Ok(exposed),
+            if done(batch.len()).stops() {
+                Err(EngineError::Stopped)
+            } else {
+                Ok(exposed)
             }
         })
         .collect::<Result<_, EngineError>>()?;

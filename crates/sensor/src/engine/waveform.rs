@@ -106,9 +106,10 @@ fn first_counting_cycle(
     }
     while with - without > 1 {
         let middle = without + (with - without) / 2;
-        match counts_within(middle)? {
-            true => with = middle,
-            false => without = middle,
+        if counts_within(middle)? {
+            with = middle
+        } else {
+            without = middle
         }
     }
     Some(without)
@@ -247,9 +248,10 @@ pub fn record(
     let netlist = Arc::clone(simulation.netlist());
     let mut first_hit = FirstHit::new(&netlist, &view.pixels, origin.max(*span.start()));
     let mut file = WaveFile::create(waves, format, &netlist, &Selection::all(), span.clone())?;
-    let end = match view.is_part {
-        true => *span.end(),
-        false => schedule.end,
+    let end = if view.is_part {
+        *span.end()
+    } else {
+        schedule.end
     };
     simulation.run_until(end, &mut (&mut file, (&mut first_hit, observer)));
     file.finish(end)?;

@@ -59,9 +59,10 @@ impl Counting {
         let (mut value, mut by_fired, mut by_children) = (0.0, 0.0, 0.0);
         let (mut fewer, mut ways) = (0.0, 1.0);
         for n in 0..=self.spads {
-            let of_others = match n <= others {
-                true => ways * silent[others - n],
-                false => 0.0,
+            let of_others = if n <= others {
+                ways * silent[others - n]
+            } else {
+                0.0
             };
             let chance = of_others * (1.0 - clamped) + fewer * clamped;
             let (holds, slope) = self.given(n, children.value);
@@ -142,9 +143,10 @@ impl Counting {
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            match of(middle) < chance {
-                true => low = middle,
-                false => high = middle,
+            if of(middle) < chance {
+                low = middle
+            } else {
+                high = middle
             }
         }
         0.5 * (low + high)

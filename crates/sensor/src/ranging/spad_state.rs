@@ -83,44 +83,38 @@ impl<'r, const K: usize> Spad<'r, K> {
         let mut light = background;
         // Afterpulses and crosstalk are few: each round has the next power of their chance.
         for _ in 0..6 {
-            ready = match law.paralysable {
-                false => Dual::constant(1.0) - fired * dead,
-                true => (light * -dead).exp(),
+            ready = if !law.paralysable {
+                Dual::constant(1.0) - fired * dead
+            } else {
+                (light * -dead).exp()
             };
             let bred = background * ready;
             light = background + bred * law.crosstalk;
             let traps = bred * law.afterpulses;
-            match law.paralysable {
-                false => {
-                    // Light before they are released keeps them trapped for another dead time, beside those that it traps anew.
-                    let lost = light * (1.0 - kept)
-                        + background * (law.afterpulses * kept)
-                        + Dual::constant(1.0 / tau);
-                    trapped = traps * lost.recip();
-                    fired = (light + trapped * (1.0 / tau))
-                        * (Dual::constant(1.0) + light * dead).recip();
-                }
-                true => {
-                    trapped = traps * tau;
-                    light += traps;
-                    fired = light * ready;
-                }
+            if !law.paralysable {
+                // Light before they are released keeps them trapped for another dead time, beside those that it traps anew.
+                let lost = light * (1.0 - kept)
+                    + background * (law.afterpulses * kept)
+                    + Dual::constant(1.0 / tau);
+                trapped = traps * lost.recip();
+                fired =
+                    (light + trapped * (1.0 / tau)) * (Dual::constant(1.0) + light * dead).recip();
+            } else {
+                trapped = traps * tau;
+                light += traps;
+                fired = light * ready;
             }
         }
         if !law.paralysable {
             ready = Dual::constant(1.0) - fired * dead;
         }
-        let traps = match law.paralysable {
-            false => {
-                let still = (light - background * law.afterpulses) * kept;
-                background * ready * law.afterpulses + trapped * still
-            }
-            true => background * ready * law.afterpulses,
+        let traps = if !law.paralysable {
+            let still = (light - background * law.afterpulses) * kept;
+            background * ready * law.afterpulses + trapped * still
+        } else {
+            background * ready * law.afterpulses
         };
-        let blinding = match law.paralysable {
-            false => fired,
-            true => light,
-        };
+        let blinding = if !law.paralysable { fired } else { light };
         let history = |of: Dual<K>| History::new(dead / h, of * h);
         let traps = Traps {
             trapping: history(traps),
@@ -197,15 +191,12 @@ impl<'r, const K: usize> Spad<'r, K> {
         if let Some(parity) = &mut self.parity {
             parity.step(dead.paralysable, light, breeding, self.ready);
         }
-        match dead.paralysable {
-            false => {
-                self.ready += recovering - fired;
-                self.blinding.push(fired);
-            }
-            true => {
-                self.ready = self.ready * (recovering - light).exp();
-                self.blinding.push(light);
-            }
+        if !dead.paralysable {
+            self.ready += recovering - fired;
+            self.blinding.push(fired);
+        } else {
+            self.ready = self.ready * (recovering - light).exp();
+            self.blinding.push(light);
         }
         if dead.crosstalk > 0.0 {
             self.by_crosstalk += by_light * crosstalk * positive(light).recip();
@@ -217,12 +208,11 @@ impl<'r, const K: usize> Spad<'r, K> {
     /// light that is forgotten.
     #[inline]
     fn avalanches(&self, light: Dual<K>, recovering: Dual<K>) -> Dual<K> {
-        match self.dead.paralysable {
-            false => {
-                let (hit, late) = light.hits();
-                self.ready * hit + recovering * late
-            }
-            true => self.ready * light * (light - recovering).exprel_neg(),
+        if !self.dead.paralysable {
+            let (hit, late) = light.hits();
+            self.ready * hit + recovering * late
+        } else {
+            self.ready * light * (light - recovering).exprel_neg()
         }
     }
 
@@ -306,13 +296,12 @@ impl<const K: usize> Parity<K> {
         let (ready, blind) = (self.ready, self.blind);
         self.ready += recovering - fired;
         self.blind = blind - recovering - fired;
-        match paralysable {
-            false => self.blinding.push(Dual::ZERO - fired),
-            true => {
-                let blind = (blind + self.blind) * 0.5;
-                let ready = (ready + self.ready) * 0.5;
-                self.blinding.push(light * (blind - ready));
-            }
+        if !paralysable {
+            self.blinding.push(Dual::ZERO - fired)
+        } else {
+            let blind = (blind + self.blind) * 0.5;
+            let ready = (ready + self.ready) * 0.5;
+            self.blinding.push(light * (blind - ready));
         }
     }
 }

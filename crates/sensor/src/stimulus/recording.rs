@@ -109,9 +109,10 @@ impl Recording {
 
     fn push(&mut self, pixel: usize, event: SpadEvent, exposure: &Exposure) {
         self.read += 1;
-        match event.time >= exposure.end() {
-            true => self.after_the_end += 1,
-            false => self.pulses[pixel].push(event),
+        if event.time >= exposure.end() {
+            self.after_the_end += 1
+        } else {
+            self.pulses[pixel].push(event)
         }
     }
 

@@ -200,9 +200,10 @@ fn cycles_from(counts: &[Vec<u32>], cycles: f64, wanted: f64) -> Option<Estimate
         }
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            match is_found(middle) {
-                true => high = middle,
-                false => low = middle,
+            if is_found(middle) {
+                high = middle
+            } else {
+                low = middle
             }
         }
         high

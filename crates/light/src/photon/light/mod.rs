@@ -178,9 +178,10 @@ impl PixelLight {
     /// The same with one more echo in all segments.
     pub fn with_echo(mut self, echo: Echo) -> Self {
         for segment in self.segments_mut() {
-            match segment.echo.photons > 0.0 {
-                true => segment.further.push(echo.clone()),
-                false => segment.echo = echo.clone(),
+            if segment.echo.photons > 0.0 {
+                segment.further.push(echo.clone())
+            } else {
+                segment.echo = echo.clone()
             }
         }
         self

@@ -235,9 +235,10 @@ impl<'a> PixelStream<'a> {
     pub fn block_fs(&self, block: u32) -> Range<i64> {
         let slots = self.stream.slots;
         let end = (block + 1) * BLOCK_SLOTS;
-        let end_fs = match end >= slots.count {
-            true => self.stream.ends_fs().end,
-            false => slots.start_fs(end),
+        let end_fs = if end >= slots.count {
+            self.stream.ends_fs().end
+        } else {
+            slots.start_fs(end)
         };
         slots.start_fs(block * BLOCK_SLOTS)..end_fs
     }
@@ -255,9 +256,10 @@ impl<'a> PixelStream<'a> {
             start_fs: block_fs.start,
             length,
             until: length.min((until_fs - block_fs.start) as f64),
-            at: match self.gap_fs.is_finite() {
-                true => [0.0; TILE],
-                false => [f64::INFINITY; TILE],
+            at: if self.gap_fs.is_finite() {
+                [0.0; TILE]
+            } else {
+                [f64::INFINITY; TILE]
             },
             times_fs: [[0; TILE]; PER_BLOCK],
             words: [[0; TILE]; PER_BLOCK],

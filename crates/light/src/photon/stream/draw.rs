@@ -173,9 +173,10 @@ impl Draw {
     #[inline]
     fn in_echo(&self, number: usize) -> (usize, usize) {
         let half = self.half_an_echo();
-        match number < half {
-            true => (0, number),
-            false => (1, number - half),
+        if number < half {
+            (0, number)
+        } else {
+            (1, number - half)
         }
     }
 

@@ -105,9 +105,10 @@ impl PhotonStream {
             0 => -FAR_FS,
             first => self.slots.start_fs(first),
         };
-        let until_fs = match slots.end == self.slots.count {
-            true => FAR_FS,
-            false => self.slots.start_fs(slots.end),
+        let until_fs = if slots.end == self.slots.count {
+            FAR_FS
+        } else {
+            self.slots.start_fs(slots.end)
         };
         Span {
             within_fs: from_fs..until_fs,

@@ -41,9 +41,10 @@ impl Foreign {
         let spads = &stream.config.spads;
         let most = MOST_PER_SPAD * spads.grid.spads() as f64;
         let is_blinding = 2.0 * reach_fs < spads.shortest_dead_time().as_fs() as f64;
-        let (share, drawn) = match is_blinding && photons > most {
-            true => (most / photons, most),
-            false => (1.0, photons.min(MOST_PER_PULSE)),
+        let (share, drawn) = if is_blinding && photons > most {
+            (most / photons, most)
+        } else {
+            (1.0, photons.min(MOST_PER_PULSE))
         };
         let foreign = Foreign {
             schedule: stream.schedule(&train.laser),

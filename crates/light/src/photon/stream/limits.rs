@@ -45,9 +45,10 @@ impl Limits {
 
     /// Laser cycles whose slots may have photons.
     pub(super) fn drawn(&self) -> Range<u32> {
-        match self.cycles.is_empty() {
-            true => 0..0,
-            false => self.cycles.start..self.cycles.end + 1,
+        if self.cycles.is_empty() {
+            0..0
+        } else {
+            self.cycles.start..self.cycles.end + 1
         }
     }
 

@@ -64,9 +64,10 @@ impl Numbers {
 
     /// A distribution, and how many draws of it make the number in this group.
     pub(super) fn of(&self, group: Group) -> (&Poisson, u32) {
-        let (cell, cycles) = match group.cycles() == group.longest() {
-            true => (&self.long, group.longest()),
-            false => (&self.short, FIRST),
+        let (cell, cycles) = if group.cycles() == group.longest() {
+            (&self.long, group.longest())
+        } else {
+            (&self.short, FIRST)
         };
         let poisson = cell.get_or_init(|| poisson(self.per_cycle * f64::from(cycles)));
         (poisson, group.cycles() / cycles)

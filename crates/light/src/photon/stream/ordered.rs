@@ -257,12 +257,11 @@ impl PixelStream<'_> {
     /// Draws the first photon of an echo after a time.
     fn draw_next(&self, echo: &mut OrderedEcho, spad: usize, after: Time) {
         let after_fs = (after - echo.start).as_fs();
-        let time_fs = match self.is_over(after_fs) {
-            true => NEVER_FS,
-            false => {
-                let word = self.echo_word(echo.cycle, spad, &mut echo.drawn[spad]);
-                self.next_arrival_fs(after_fs, word)
-            }
+        let time_fs = if self.is_over(after_fs) {
+            NEVER_FS
+        } else {
+            let word = self.echo_word(echo.cycle, spad, &mut echo.drawn[spad]);
+            self.next_arrival_fs(after_fs, word)
         };
         echo.next[spad] = echo.start + Time::from_fs(time_fs);
         self.skip_before_exposure(echo, spad);

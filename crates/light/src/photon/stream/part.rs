@@ -192,9 +192,10 @@ impl PixelStream<'_> {
     /// The group of a laser cycle.
     pub fn group_of(&self, cycle: u32) -> Group {
         let grid = self.stream.config.spads.grid;
-        match self.has_long_groups {
-            true => Group::long(cycle, grid),
-            false => Group::of_cycle(cycle, grid),
+        if self.has_long_groups {
+            Group::long(cycle, grid)
+        } else {
+            Group::of_cycle(cycle, grid)
         }
     }
 
@@ -224,9 +225,10 @@ impl PixelStream<'_> {
         if self.foreign.is_some() && self.is_bright {
             return self.stream.ends_fs();
         }
-        match self.signal_per_spad > 0.0 {
-            true => self.echo_fs.0..self.echo_fs.1 + 1,
-            false => 0..0,
+        if self.signal_per_spad > 0.0 {
+            self.echo_fs.0..self.echo_fs.1 + 1
+        } else {
+            0..0
         }
     }
 
@@ -257,12 +259,11 @@ impl PixelStream<'_> {
 
     /// From when on a SPAD's part of an echo has no more than [`LATE`] photons left, fs after the start of its cycle.
     fn late_fs(&self) -> i64 {
-        match self.signal_per_spad > LATE {
-            true => {
-                let after_fs = self.gaussian.quantile(1.0 - LATE / self.signal_per_spad);
-                self.arrival_fs + after_fs.ceil() as i64
-            }
-            false => i64::MIN,
+        if self.signal_per_spad > LATE {
+            let after_fs = self.gaussian.quantile(1.0 - LATE / self.signal_per_spad);
+            self.arrival_fs + after_fs.ceil() as i64
+        } else {
+            i64::MIN
         }
     }
 

@@ -55,9 +55,10 @@ impl Schedule {
         let count = (end_s / laser.period_s + before).ceil() as u32;
         let mut random = words(laser.number, 1);
         let sent = (0..count).map(|pulse| {
-            let late_s = match laser.dither_s > 0.0 {
-                true => laser.dither_s * unit(random.next_u32()),
-                false => 0.0,
+            let late_s = if laser.dither_s > 0.0 {
+                laser.dither_s * unit(random.next_u32())
+            } else {
+                0.0
             };
             (((f64::from(pulse) - before + phase) * laser.period_s + late_s) * 1e15).round() as i64
         });
@@ -90,9 +91,10 @@ impl Schedule {
         let (mut begun, mut not_begun) = (0, stream.config.laser_cycles.max(1));
         while not_begun - begun > 1 {
             let middle = begun + (not_begun - begun) / 2;
-            match self.start_fs(stream, middle) <= time_fs {
-                true => begun = middle,
-                false => not_begun = middle,
+            if self.start_fs(stream, middle) <= time_fs {
+                begun = middle
+            } else {
+                not_begun = middle
             }
         }
         begun

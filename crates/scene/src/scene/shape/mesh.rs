@@ -193,9 +193,10 @@ impl Mesh {
         Mesh {
             path: path.to_owned(),
             triangles: in_order().map(|n| corners(listed.triangles[n])).collect(),
-            on_texture: match listed.on_texture.is_empty() {
-                true => Vec::new(),
-                false => in_order().map(|n| listed.on_texture[n]).collect(),
+            on_texture: if listed.on_texture.is_empty() {
+                Vec::new()
+            } else {
+                in_order().map(|n| listed.on_texture[n]).collect()
             },
             numbers,
             tree,
@@ -222,9 +223,10 @@ impl Mesh {
             direction: ray.direction,
         };
         let inside = (about.origin.abs() - self.size * 0.5).max_element() < 0.0;
-        let skipped = match inside {
-            true => 0.0,
-            false => solid::meet_box(&about, self.size)?.range_m,
+        let skipped = if inside {
+            0.0
+        } else {
+            solid::meet_box(&about, self.size)?.range_m
         };
         // Rounding must not hide a nearer triangle behind this one.
         let room = self.size.max_element() as f32 * ROOM;

@@ -230,12 +230,13 @@ fn fog_before_a_mirror_or_pane_is_there_once() {
 
 /// Something at the image that the lidar sees, and then what there is.
 fn thing(place: DVec3, normal: DVec3, is_ball: bool) -> Object {
-    let shape = match is_ball {
-        true => Shape::Sphere {
+    let shape = if is_ball {
+        Shape::Sphere {
             centre_m: place,
             radius_m: 0.5,
-        },
-        false => sheet(place, normal, 0.7),
+        }
+    } else {
+        sheet(place, normal, 0.7)
     };
     Object::new("thing", 0.6, shape)
 }
@@ -294,15 +295,12 @@ proptest! {
         aim in (-0.2f64..0.2, -0.2f64..0.2), lean in lean(), is_ball in any::<bool>(), radius_m in 0.3f64..3.0,
     ) {
         let centre_m = DVec3::new(0.0, 0.0, 4.0 + radius_m);
-        let shape = match is_ball {
-            true => Shape::Sphere { centre_m, radius_m },
-            false => Shape::Cylinder {
-                centre_m,
-                axis: DVec3::new(0.3, 1.0, 0.2),
-                radius_m,
-                height_m: 9.0,
-            },
-        };
+        let shape = if is_ball { Shape::Sphere { centre_m, radius_m } } else { Shape::Cylinder {
+            centre_m,
+            axis: DVec3::new(0.3, 1.0, 0.2),
+            radius_m,
+            height_m: 9.0,
+        } };
         let mut scene = lidar();
         scene.objects = vec![mirror(shape, 1.0)];
         let look = Ray::new(DVec3::ZERO, DVec3::new(aim.0 * radius_m / 3.0, aim.1 * radius_m / 3.0, 1.0));

@@ -67,13 +67,15 @@ pub(super) fn match_pair(matcher: &Matcher, left: &GreyImage, right: &GreyImage)
         };
         for &y in &ys {
             for &x in &xs {
-                let before = match inside(x - dx, y - dy) {
-                    true => l[index(x - dx, y - dy)].clone(),
-                    false => vec![None; disparities as usize],
+                let before = if inside(x - dx, y - dy) {
+                    l[index(x - dx, y - dy)].clone()
+                } else {
+                    vec![None; disparities as usize]
                 };
-                let step = match inside(x - dx, y - dy) {
-                    true => brightness[index(x, y)].abs_diff(brightness[index(x - dx, y - dy)]),
-                    false => 0,
+                let step = if inside(x - dx, y - dy) {
+                    brightness[index(x, y)].abs_diff(brightness[index(x - dx, y - dy)])
+                } else {
+                    0
                 };
                 let mut p2 = i64::from(matcher.p2);
                 if matcher.p2_halved_by > 0 {

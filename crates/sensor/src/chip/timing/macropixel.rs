@@ -89,18 +89,20 @@ impl MacropixelCircuit {
         let adds = config.tdc == Tdc::Counter;
         let event = probes.find(Probe::SpadEvent).unwrap_or_default();
         MacropixelCircuit {
-            clocked: match has_own || adds {
-                true => netlist.cells().iter().filter_map(data).collect(),
-                false => event.to_vec(),
+            clocked: if has_own || adds {
+                netlist.cells().iter().filter_map(data).collect()
+            } else {
+                event.to_vec()
             },
             toggles: probes.toggle_cells(&netlist),
             joins: config.front_end.joins(),
-            sampled: match config.front_end.joins() || config.front_end_block.is_some() {
-                true => probes
+            sampled: if config.front_end.joins() || config.front_end_block.is_some() {
+                probes
                     .samplers(&netlist)
                     .map(|cell| netlist.cells()[cell].input(0))
-                    .collect(),
-                false => Vec::new(),
+                    .collect()
+            } else {
+                Vec::new()
             },
             late: probes.shaper_ends(&netlist),
             hits: probes.hit_cells(&netlist),
@@ -137,9 +139,10 @@ impl MacropixelCircuit {
         let (library, corner, known) = self
             .cell_timing
             .get_or_init(|| (cells.0, cells.1, of_library()));
-        let timing = match (*library, *corner) == cells {
-            true => known.clone(),
-            false => of_library(),
+        let timing = if (*library, *corner) == cells {
+            known.clone()
+        } else {
+            of_library()
         };
         silicon.timing_of(&self.netlist, timing, path)
     }

@@ -126,9 +126,10 @@ impl Blindness {
 /// Probabilities of a photon and of none where `mean` are expected.
 fn photon_or_none(mean: f64) -> (f64, f64) {
     let p = absorbed(mean);
-    let q = match mean < DIM {
-        true => 1.0 - p,
-        false => libm::exp(-mean),
+    let q = if mean < DIM {
+        1.0 - p
+    } else {
+        libm::exp(-mean)
     };
     (p, q)
 }
@@ -171,9 +172,10 @@ impl Ages {
 
     /// The probability `share` of an age, in one of those SPADs, the part `left`, that are of no age looked at before.
     pub(super) fn among(share: f64, left: f64) -> f64 {
-        match share > 0.0 {
-            true => (share / left).min(1.0),
-            false => 0.0,
+        if share > 0.0 {
+            (share / left).min(1.0)
+        } else {
+            0.0
         }
     }
 

@@ -232,9 +232,10 @@ impl Scene {
                     lit_fs: start_fs..starts_fs + cycles as f64 * self.cycle_fs,
                     echoes: sent,
                 },
-                before: match is_settled {
-                    true => Before::Steady(steady_until.max(since_fs)),
-                    false => Before::Dark(starts_fs),
+                before: if is_settled {
+                    Before::Steady(steady_until.max(since_fs))
+                } else {
+                    Before::Dark(starts_fs)
                 },
                 not_compared: law.not_compared(window, cycle),
             }

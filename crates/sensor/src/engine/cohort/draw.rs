@@ -82,9 +82,10 @@ pub fn none_of(n: u64, p: f64, q: f64) -> f64 {
     if n <= MOST_FACTORS {
         return power(q, n);
     }
-    let ln_q = match p < 1e-3 {
-        true => -p * (1.0 + p * (1.0 / 2.0 + p * (1.0 / 3.0 + p * (0.25 + p * 0.2)))),
-        false => libm::log1p(-p),
+    let ln_q = if p < 1e-3 {
+        -p * (1.0 + p * (1.0 / 2.0 + p * (1.0 / 3.0 + p * (0.25 + p * 0.2))))
+    } else {
+        libm::log1p(-p)
     };
     libm::exp(n as f64 * ln_q)
 }

@@ -276,9 +276,12 @@ impl Spad {
         let (mut ready, steady) = secondaries.steady(rate, dead_fs);
         // From a dead time before the grid on.
         let mut acts: Vec<Acts> = (0..back)
-            .map(|cell| match cell < self.cells.len() {
-                true => steady.times(self.width_fs(cell)),
-                false => Acts::default(),
+            .map(|cell| {
+                if cell < self.cells.len() {
+                    steady.times(self.width_fs(cell))
+                } else {
+                    Acts::default()
+                }
             })
             .collect();
         // Of each cell, avalanches that one SPAD gets from others.
@@ -335,9 +338,10 @@ impl Spad {
             }
         }
         fine.ages.fill_up();
-        match secondaries.are_none() {
-            true => fine.divide_by_photons(),
-            false => fine.balance(),
+        if secondaries.are_none() {
+            fine.divide_by_photons()
+        } else {
+            fine.balance()
         }
         fine
     }

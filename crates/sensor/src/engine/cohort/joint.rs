@@ -289,14 +289,14 @@ impl<'a> Tree<'a> {
         };
         let law = &self.laws.laws[group.hits];
         let spads = law.spads;
-        let hit = match waiting {
-            true if rest.is_empty() => cycles,
-            true => {
-                let p = law.any() / group.any_from_here;
-                let q = law.none() * rest[0].any_from_here / group.any_from_here;
-                binomial(cycles, p.min(1.0), q.min(1.0), random)
-            }
-            false => binomial(cycles, law.any(), law.none(), random),
+        let hit = if !waiting {
+            binomial(cycles, law.any(), law.none(), random)
+        } else if rest.is_empty() {
+            cycles
+        } else {
+            let p = law.any() / group.any_from_here;
+            let q = law.none() * rest[0].any_from_here / group.any_from_here;
+            binomial(cycles, p.min(1.0), q.min(1.0), random)
         };
         self.spread(node, cycles - hit, rest, waiting, outcome, random);
         let mut at_least = hit;

@@ -150,12 +150,13 @@ impl Cohort {
     /// This engine with the law of a macropixel, where each has its own: what [`Cohort::expected`] and
     /// [`Cohort::cohorts_in_steps`] are asked of there.
     pub fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
-        match self.sensor.has_own_laws() && !self.is_of_macropixel {
-            true => Cow::Owned(Cohort {
+        if self.sensor.has_own_laws() && !self.is_of_macropixel {
+            Cow::Owned(Cohort {
                 is_of_macropixel: true,
                 ..Self::with_law(self.law.of_macropixel(number), self.options)
-            }),
-            false => Cow::Borrowed(self),
+            })
+        } else {
+            Cow::Borrowed(self)
         }
     }
 
@@ -334,9 +335,10 @@ impl Expose for Cohort {
         let kept = kept.filter(|kept| kept.is_of(config));
         for pixel in pixels {
             let light = pixel.light.as_ref().unwrap_or(&dark);
-            let light = match light.has_trains() {
-                true => &stream.with_trains_as_echoes(light, self.sight_fs(config, pixel.start)),
-                false => light,
+            let light = if light.has_trains() {
+                &stream.with_trains_as_echoes(light, self.sight_fs(config, pixel.start))
+            } else {
+                light
             };
             let sums = match kept {
                 Some(kept) => {

@@ -326,17 +326,14 @@ impl<'a> Pool<'a> {
         let first = self.now - memory;
         // One vector is the common case, and stays in registers.
         let (mut few, mut many): ([_; 1], SmallVec<[[f64; VECTOR]; 4]>);
-        let missed = match groups <= VECTOR {
-            true => {
-                few = [[0.0; VECTOR]];
-                self.meet(overlap, candidates, &mut few, random);
-                few.as_flattened()
-            }
-            false => {
-                many = smallvec![[0.0; VECTOR]; groups.div_ceil(VECTOR)];
-                self.meet(overlap, candidates, &mut many, random);
-                many.as_flattened()
-            }
+        let missed = if groups <= VECTOR {
+            few = [[0.0; VECTOR]];
+            self.meet(overlap, candidates, &mut few, random);
+            few.as_flattened()
+        } else {
+            many = smallvec![[0.0; VECTOR]; groups.div_ceil(VECTOR)];
+            self.meet(overlap, candidates, &mut many, random);
+            many.as_flattened()
         };
         let mut without_pulse = self.idle - count(missed[0]);
         let mut others = hit - without_pulse;

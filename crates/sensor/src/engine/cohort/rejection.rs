@@ -86,9 +86,10 @@ impl Rejection {
     /// As [`Rejection::passes`], also at the ends.
     #[cold]
     pub(super) fn passes_anywhere(&self, proposal: &Proposal) -> bool {
-        match self.is_at_an_end(proposal) {
-            true => self.weigh(proposal, |n| stirling_error(n as u64)),
-            false => self.passes(proposal),
+        if self.is_at_an_end(proposal) {
+            self.weigh(proposal, |n| stirling_error(n as u64))
+        } else {
+            self.passes(proposal)
         }
     }
 

@@ -40,9 +40,10 @@ impl Cell {
     pub(super) fn new(mean: f64) -> Self {
         let any = absorbed(mean);
         // Where the quotient would lose its digits, a series.
-        let fire = match mean < 1e-3 {
-            true => mean * (0.5 - mean * (1.0 / 6.0 - mean * (1.0 / 24.0))),
-            false => 1.0 - any / mean,
+        let fire = if mean < 1e-3 {
+            mean * (0.5 - mean * (1.0 / 6.0 - mean * (1.0 / 24.0)))
+        } else {
+            1.0 - any / mean
         };
         Cell {
             mean,
@@ -55,9 +56,10 @@ impl Cell {
 
     /// As many more, for a reason of its own.
     fn and(self, more: f64) -> Self {
-        match more > 0.0 {
-            true => Cell::new(self.mean + more),
-            false => self,
+        if more > 0.0 {
+            Cell::new(self.mean + more)
+        } else {
+            self
         }
     }
 

@@ -19,9 +19,10 @@ pub(super) const DIM: f64 = 0.015;
 
 /// Probability of a photon where `mean` are expected.
 pub(super) fn absorbed(mean: f64) -> f64 {
-    match mean < DIM {
-        true => absorbed_dim(mean),
-        false => -libm::expm1(-mean),
+    if mean < DIM {
+        absorbed_dim(mean)
+    } else {
+        -libm::expm1(-mean)
     }
 }
 
@@ -306,9 +307,10 @@ impl SpadLight {
             for (i, mean) in means.iter_mut().enumerate() {
                 let from = edge(i).max(lit_fs.start);
                 let until = edge(i + 1).min(lit_fs.end).max(from);
-                *mean = match is_steady {
-                    true => self.background(until - from),
-                    false => self.background_between(from, until, extent),
+                *mean = if is_steady {
+                    self.background(until - from)
+                } else {
+                    self.background_between(from, until, extent)
                 };
             }
         }

@@ -79,9 +79,10 @@ impl<'a> Weighted<'a> {
         let lost = &mut self.total_named;
         lost.fill([0.0; LANES]);
         for (index, age) in self.ages.iter_mut().enumerate() {
-            let (renews, pulses) = match index < memory {
-                true => self.blindness.hit(bin, index + 1, p),
-                false => (p, p),
+            let (renews, pulses) = if index < memory {
+                self.blindness.hit(bin, index + 1, p)
+            } else {
+                (p, p)
             };
             if renews == 0.0 {
                 continue;

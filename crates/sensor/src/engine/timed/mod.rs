@@ -331,9 +331,12 @@ impl Replay for Timed {
         }
         follows(&self.uniform, &self.uniform.timing().pulses)?;
         let arrive = self.arrive(pixels.iter().map(|pixel| pixel.start));
-        let judge = |pixel: &PulsedPixel<'_>| match arrive[&pixel.start] {
-            true => self.judge(pixel),
-            false => Ok(Judged::InDoubt(Doubt::Load)),
+        let judge = |pixel: &PulsedPixel<'_>| {
+            if arrive[&pixel.start] {
+                self.judge(pixel)
+            } else {
+                Ok(Judged::InDoubt(Doubt::Load))
+            }
         };
         let judged: Result<Vec<Judged>, EngineError> = pixels.par_iter().map(judge).collect();
         let mut judged = judged?;

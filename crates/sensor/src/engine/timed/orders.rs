@@ -139,9 +139,10 @@ impl Orders {
                     let count = exposure.falling(rises.first) + self.counter_clk;
                     count > exposure.stop(1) + self.reset + MARGIN
                 });
-                match is_reset_first {
-                    true => Ok(vec![whole(None)]),
-                    false => Err(Doubt::Race(Conflict::StrobeAtNextReset)),
+                if is_reset_first {
+                    Ok(vec![whole(None)])
+                } else {
+                    Err(Doubt::Race(Conflict::StrobeAtNextReset))
                 }
             }
         }

@@ -187,9 +187,10 @@ fn keep_words(
     marks: &mut [u32],
 ) {
     let last = (PER_BLOCK - 1) * blocks + block;
-    let (code, mark) = match words < PER_BLOCK {
-        true => (Code::NONE, 0),
-        false => (codes[last], marks[last]),
+    let (code, mark) = if words < PER_BLOCK {
+        (Code::NONE, 0)
+    } else {
+        (codes[last], marks[last])
     };
     (codes[last], marks[last]) = (code, mark);
     for row in 1..PER_BLOCK - 1 {

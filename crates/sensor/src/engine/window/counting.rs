@@ -445,9 +445,10 @@ impl<'a> Counting<'a> {
 impl Pixel<'_> {
     /// What is drawn of a part of the light.
     fn spans(&self, part: &PixelStream<'_>) -> &Spans {
-        match part.breeds() {
-            true => &self.sight.breeding,
-            false => &self.sight.plain,
+        if part.breeds() {
+            &self.sight.breeding
+        } else {
+            &self.sight.plain
         }
     }
 

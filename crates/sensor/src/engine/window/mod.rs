@@ -128,9 +128,10 @@ impl Replay for Window {
     }
 
     fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
-        match self.is_of_macropixel {
-            true => Cow::Borrowed(pulses),
-            false => by_own_clk(&self.sensor, number, pulses),
+        if self.is_of_macropixel {
+            Cow::Borrowed(pulses)
+        } else {
+            by_own_clk(&self.sensor, number, pulses)
         }
     }
 }

@@ -44,9 +44,10 @@ impl Window {
 
     /// This engine with the law of a macropixel.
     pub(super) fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
-        match self.sensor.has_own_laws() && !self.is_of_macropixel {
-            true => Cow::Owned(Self::of_one(self.law.of_macropixel(number))),
-            false => Cow::Borrowed(self),
+        if self.sensor.has_own_laws() && !self.is_of_macropixel {
+            Cow::Owned(Self::of_one(self.law.of_macropixel(number)))
+        } else {
+            Cow::Borrowed(self)
         }
     }
 

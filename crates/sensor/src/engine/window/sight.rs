@@ -54,9 +54,10 @@ impl Spans {
         };
         let own = slots(from_fs, until_fs);
         let previous = slots(cycle_fs + from_fs, cycle_fs + until_fs);
-        let from_fs = match previous.is_empty() {
-            true => all.start_fs(own.start),
-            false => all.start_fs(previous.start) - cycle_fs,
+        let from_fs = if previous.is_empty() {
+            all.start_fs(own.start)
+        } else {
+            all.start_fs(previous.start) - cycle_fs
         };
         Some(Spans {
             own: Span {

@@ -86,9 +86,12 @@ fn by_cramer(
     free: &[usize],
     which: usize,
 ) -> f64 {
-    let swapped = |row: usize, col: usize| match col == which {
-        true => wanted[row],
-        false => matrix[row][col],
+    let swapped = |row: usize, col: usize| {
+        if col == which {
+            wanted[row]
+        } else {
+            matrix[row][col]
+        }
     };
     minor(free, free, &swapped) / minor(free, free, &|row, col| matrix[row][col])
 }
@@ -164,10 +167,7 @@ proptest! {
         let mut damped = information;
         (0..PARAMETERS).for_each(|i| damped[i][i] += damping * information[i][i] + 1e-6);
         let step = likelihood.step(&light, &local, damping).unwrap();
-        let whole: Vec<f64> = (0..PARAMETERS).map(|i| match free[i] {
-            true => by_cramer(&damped, &score, &numbers, i),
-            false => 0.0,
-        }).collect();
+        let whole: Vec<f64> = (0..PARAMETERS).map(|i| if free[i] { by_cramer(&damped, &score, &numbers, i) } else { 0.0 }).collect();
         let most = [0.5 + 0.5 * response.pulse_sigma_bins, 1.0, 1.5, 0.5];
         let times = whole.iter().zip(most).map(|(step, most)| step.abs() / most).fold(1.0, f64::max);
         for (step, whole) in step.iter().zip(&whole) {
@@ -180,10 +180,7 @@ proptest! {
             known[2][2] += 12.0 * (light.background_per_bin / 0.1).powi(2);
         }
         let bound = likelihood.bound_bins(&local);
-        let variance = match free[0] {
-            true => by_cramer(&known, &[1.0, 0.0, 0.0, 0.0], &numbers, 0),
-            false => 1.0,
-        };
+        let variance = if free[0] { by_cramer(&known, &[1.0, 0.0, 0.0, 0.0], &numbers, 0) } else { 1.0 };
         prop_assert!((bound / variance.sqrt() - 1.0).abs() < 1e-6, "{bound} {variance}");
     }
 }

@@ -53,9 +53,10 @@ fn by_states(dead: &Dead, light: &[f64]) -> Vec<Seen> {
         }
         let bin = seen.last_mut().unwrap();
         for _ in 0..SMALL {
-            match dead.paralysable {
-                false => states.fire(photons * STEPS as f64, bin),
-                true => states.fire_or_blind(photons * STEPS as f64, bin),
+            if !dead.paralysable {
+                states.fire(photons * STEPS as f64, bin)
+            } else {
+                states.fire_or_blind(photons * STEPS as f64, bin)
             }
         }
         bin.odd = (1.0 - states.signs()) / 2.0;

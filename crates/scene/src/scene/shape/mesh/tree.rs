@@ -111,9 +111,10 @@ impl Tree {
         };
         let over = direction.to_array().map(over);
         let axes: [_; 3] = std::array::from_fn(|axis| {
-            let (near, far) = match over[axis] < 0.0 {
-                true => (axis + 3, axis),
-                false => (axis, axis + 3),
+            let (near, far) = if over[axis] < 0.0 {
+                (axis + 3, axis)
+            } else {
+                (axis, axis + 3)
             };
             (
                 near,

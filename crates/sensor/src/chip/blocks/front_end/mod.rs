@@ -40,9 +40,10 @@ impl FrontEnd {
 impl SensorConfig {
     /// Lines of SPAD_TIMED, which the correlation block counts: one a SPAD, or one for all.
     pub fn lines(&self) -> usize {
-        match self.front_end.joins() {
-            false => self.spads(),
-            true => 1,
+        if !self.front_end.joins() {
+            self.spads()
+        } else {
+            1
         }
     }
 

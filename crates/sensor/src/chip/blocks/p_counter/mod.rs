@@ -40,9 +40,10 @@ impl PCounter {
 
     /// The QuantIC4x4 with this P-counter, LOCAL_STOP taken where it suits.
     pub fn sensor(self) -> SensorConfig {
-        let (tap, after_borrow) = match self.row().has_memory {
-            true => (Tap::Borrow, AfterBorrow::Hold),
-            false => (Tap::Msb, AfterBorrow::Wrap),
+        let (tap, after_borrow) = if self.row().has_memory {
+            (Tap::Borrow, AfterBorrow::Hold)
+        } else {
+            (Tap::Msb, AfterBorrow::Wrap)
         };
         SensorConfig {
             p_counter: self,

@@ -22,9 +22,10 @@ use crate::netlist::{CellKind, ModuleBuilder, Net};
 pub(super) fn place(m: &mut ModuleBuilder, clk: Net, reset: Net, bits: u32) -> Net {
     let mut clock = clk;
     for bit in 0..bits {
-        let name = match bit + 1 == bits {
-            true => "STEP_CLK".to_owned(),
-            false => format!("STEP_{bit}"),
+        let name = if bit + 1 == bits {
+            "STEP_CLK".to_owned()
+        } else {
+            format!("STEP_{bit}")
         };
         let q = m.wire(&name);
         let q_n = m.wire(&format!("STEP_N_{bit}"));

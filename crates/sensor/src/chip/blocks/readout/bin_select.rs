@@ -57,9 +57,12 @@ pub fn circuit(bins: usize, bits: usize) -> Arc<Module> {
 
 /// Reference model: WORD for the counts of a macropixel, with ROW_READ and BIN_READ (bit b for bin b).
 pub fn model(counts: &[u16], row_read: bool, bin_read: u64) -> u16 {
-    let selected = |(bin, &count): (usize, &u16)| match row_read && bin_read >> bin & 1 == 1 {
-        true => count,
-        false => 0,
+    let selected = |(bin, &count): (usize, &u16)| {
+        if row_read && bin_read >> bin & 1 == 1 {
+            count
+        } else {
+            0
+        }
     };
     counts
         .iter()

@@ -206,9 +206,10 @@ pub(super) fn place(
     let full = serialiser(order.cols_per_pin, order.cols_per_pin, bits);
     for (pin, data_out) in data_out.chunks(1).enumerate() {
         let of_pin = order.columns(pin);
-        let circuit = match of_pin.len() == order.cols_per_pin {
-            true => Arc::clone(&full),
-            false => serialiser(of_pin.len(), order.cols_per_pin, bits),
+        let circuit = if of_pin.len() == order.cols_per_pin {
+            Arc::clone(&full)
+        } else {
+            serialiser(of_pin.len(), order.cols_per_pin, bits)
         };
         let words = &columns[of_pin.start * bits..of_pin.end * bits];
         let ports = [("WORD", words), ("DATA_OUT", data_out)];

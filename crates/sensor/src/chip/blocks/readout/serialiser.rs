@@ -22,9 +22,10 @@ use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 ///
 /// Ports: WORD\<cols × bits\> (first column first, bit 0 first), READ_CLK, READ_RESET, WORD_LOAD → DATA_OUT.
 pub fn circuit(cols: usize, most: usize, bits: usize) -> Arc<Module> {
-    let name = match cols == most {
-        true => "serialiser".to_owned(),
-        false => format!("serialiser_of_{cols}"),
+    let name = if cols == most {
+        "serialiser".to_owned()
+    } else {
+        format!("serialiser_of_{cols}")
     };
     let length = cols * bits;
     let mut m = ModuleBuilder::new(name);
@@ -40,9 +41,10 @@ pub fn circuit(cols: usize, most: usize, bits: usize) -> Arc<Module> {
             None => m.gate(CellKind::And2, &[bit, load]),
             Some(before) => m.gate(CellKind::Mux2, &[before, bit, load]),
         };
-        let q = match stage + 1 == length {
-            true => out,
-            false => m.wire(&format!("STAGE_{stage}")),
+        let q = if stage + 1 == length {
+            out
+        } else {
+            m.wire(&format!("STAGE_{stage}"))
         };
         m.cell(
             &format!("stage_{stage}"),

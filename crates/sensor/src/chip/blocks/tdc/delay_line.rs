@@ -51,9 +51,10 @@ pub fn circuit(elements: usize) -> Arc<Module> {
 pub fn model(netlist: &Netlist, timing: &Timing, path: &str) -> Steps {
     let element = |number: usize| {
         let name = format!("element_{number}");
-        netlist.cell(&match path.is_empty() {
-            true => name,
-            false => format!("{path}.{name}"),
+        netlist.cell(&if path.is_empty() {
+            name
+        } else {
+            format!("{path}.{name}")
         })
     };
     let elements = (0..).map_while(element);

@@ -67,9 +67,12 @@ impl Model {
     /// # Panics
     /// When there is no ring.
     pub fn of(netlist: &Netlist, timing: &Timing, path: &str) -> Self {
-        let cell = |name: &str| match path.is_empty() {
-            true => netlist.cell(name),
-            false => netlist.cell(&format!("{path}.{name}")),
+        let cell = |name: &str| {
+            if path.is_empty() {
+                netlist.cell(name)
+            } else {
+                netlist.cell(&format!("{path}.{name}"))
+            }
         };
         let delay = |name: &str, pin: usize, to| {
             let cell = cell(name).expect("a ring has its cells");

@@ -82,9 +82,10 @@ impl Beginning {
         }
         let start = stream.cycle_start(cycle);
         // Where slots are short, whole blocks may come before the exposure.
-        let block = match time > Time::ZERO {
-            true => light.block_at((time - start).as_fs()),
-            false => 0,
+        let block = if time > Time::ZERO {
+            light.block_at((time - start).as_fs())
+        } else {
+            0
         };
         let time = start + Time::from_fs(light.block_fs(block).start);
         Beginning {

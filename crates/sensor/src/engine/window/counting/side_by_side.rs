@@ -84,9 +84,12 @@ impl Counting<'_> {
         let start_fs = light.block_fs(block).start;
         tile.begin(
             layout,
-            std::array::from_fn(|lane| match lane < lanes {
-                true => start_fs + moved_fs(relative, lane),
-                false => 0,
+            std::array::from_fn(|lane| {
+                if lane < lanes {
+                    start_fs + moved_fs(relative, lane)
+                } else {
+                    0
+                }
             }),
         );
         light.first_arrivals(first_cycle, &mut tile.next_fs);
@@ -102,9 +105,12 @@ impl Counting<'_> {
                 layout.until_fs - relative * self.stream.cycle_fs + ROUNDING_FS,
             );
             let end_fs = background.end_fs();
-            let moved_fs: [i64; TILE] = std::array::from_fn(|lane| match lane < lanes {
-                true => moved_fs(relative, lane),
-                false => 0,
+            let moved_fs: [i64; TILE] = std::array::from_fn(|lane| {
+                if lane < lanes {
+                    moved_fs(relative, lane)
+                } else {
+                    0
+                }
             });
             while background.draw() {
                 for lane in 0..lanes {
