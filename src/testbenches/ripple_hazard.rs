@@ -116,7 +116,7 @@ fn delays(netlist: &Netlist) -> Timing {
     let mut timing = nominal;
     for cell in 0..netlist.cells().len() {
         if netlist.cell_path(cell).contains(&second) {
-            timing.set(cell, *mismatched.of(cell));
+            timing.set(cell, *mismatched.cell_delays(cell));
         }
     }
     timing

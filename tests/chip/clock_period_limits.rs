@@ -45,8 +45,8 @@ fn the_typical_corner_has_the_published_ripple_and_period() {
     let hold = Library::generic_40nm().checks(CellKind::Dffr).hold;
     let hold = Time::from_fs(
         hold.rise
-            .at(Corner::Typ)
-            .max(hold.fall.at(Corner::Typ))
+            .in_corner_fs(Corner::Typ)
+            .max(hold.fall.in_corner_fs(Corner::Typ))
             .into(),
     );
     assert!(((kept - captured) - hold * 2).as_fs().abs() <= 1_000);

@@ -126,7 +126,7 @@ fn compare(mapped: &Mapped, seed: u64) -> (usize, usize) {
     let theirs: BTreeMap<String, Edges> = theirs.collect();
 
     let slowest = (0..mapped.netlist.cells().len()).flat_map(|cell| {
-        let arcs = timing.of(cell).as_flattened().iter();
+        let arcs = timing.cell_delays(cell).as_flattened().iter();
         arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
             .collect::<Vec<_>>()
     });

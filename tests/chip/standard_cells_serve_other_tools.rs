@@ -139,7 +139,8 @@ fn delays_are_written_without_elaborating_the_design() {
                 for (pin, output) in (0..cell.kind.inputs().len())
                     .flat_map(|pin| (0..cell.kind.outputs().len()).map(move |output| (pin, output)))
                 {
-                    let [read, written] = [&timing, nominal].map(|t| t.of(index)[pin][output]);
+                    let [read, written] =
+                        [&timing, nominal].map(|t| t.cell_delays(index)[pin][output]);
                     assert_eq!(read, written, "{}", netlist.cell_path(index));
                 }
             }

@@ -105,7 +105,7 @@ proptest! {
         let found = converter.convert("CODE", Some(period), &intervals);
         // NOT CLK rises so long after CLK falls.
         let inverter = converter.netlist.cells().iter().position(|c| c.kind == CellKind::Inv).unwrap();
-        let late = Time::from_fs(converter.timing.of(inverter)[0][0].to(Logic::One).into());
+        let late = Time::from_fs(converter.timing.cell_delays(inverter)[0][0].delay_fs(Logic::One).into());
         for (slot, (&interval, found)) in (0..).zip(intervals.iter().zip(found)) {
             let start = SLOT * slot + SETTLING * 2;
             let half = Time::from_fs(period.as_fs() / 2);

@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     let drives = drives.map(|(ns, net, level)| Drive::new(Time::from_ns(ns), net, level));
     let ticks = clock(clk, Frequency::from_hz(1_000_000_000), Time::ZERO, 0, 40);
-    let mut stimulus = Stimulus::new(drives).with(ticks);
+    let mut stimulus = Stimulus::new(drives).with_drives(ticks);
 
     // Two observers of one simulation.
     let (vcd, fst) = (folder.join("register.vcd"), folder.join("register.fst"));

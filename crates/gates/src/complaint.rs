@@ -132,7 +132,7 @@ impl InputError {
     }
 
     /// A complaint about one line (counted from 1) of `source`.
-    pub fn at(source: impl fmt::Display, line: usize, message: impl Into<String>) -> Self {
+    pub fn at_line(source: impl fmt::Display, line: usize, message: impl Into<String>) -> Self {
         InputError {
             line: Some(line),
             ..Self::new(source, message)

@@ -22,8 +22,8 @@ impl TimingChecks {
         // All histories first, so that the judgement sees the whole instant.
         touched.retain(|&net| self.nets[net as usize].advance(self.now_fs));
         for &net in &touched {
-            for position in self.pins.of(net as usize) {
-                let (index, pin) = self.pins.at(position);
+            for position in self.pins.positions(net as usize) {
+                let (index, pin) = self.pins.pin(position);
                 if pin == DATA {
                     self.unsettle(index);
                 }
@@ -31,8 +31,8 @@ impl TimingChecks {
         }
         if self.now_fs >= self.not_before_fs {
             for &net in &touched {
-                for position in self.pins.of(net as usize) {
-                    match self.pins.at(position) {
+                for position in self.pins.positions(net as usize) {
+                    match self.pins.pin(position) {
                         (flip_flop, DATA) => self.judge_data(flip_flop),
                         (bank, pin) => self.judge_bank(bank as usize, pin),
                     }
@@ -160,7 +160,7 @@ impl TimingChecks {
     #[inline]
     fn edge_nearest_setup(&self, index: u32, data: History) -> Option<Edge> {
         let limits = &self.limits[self.flip_flops[index as usize].limits as usize];
-        let limit = |edge| limits.at(Control::Reset, CheckKind::Setup, edge);
+        let limit = |edge| limits.limit_fs(Control::Reset, CheckKind::Setup, edge);
         let before = |edge: &Edge| ![NEVER, self.now_fs].contains(&data.last(*edge));
         let edges = Edge::BOTH.into_iter().filter(before);
         edges.max_by_key(|&edge| data.last(edge) + i64::from(limit(edge)))
@@ -194,7 +194,7 @@ impl TimingChecks {
             SET => Control::Set,
             _ => Control::Reset,
         };
-        let limit_fs = self.limits[bank.limits as usize].at(control, kind, edge);
+        let limit_fs = self.limits[bank.limits as usize].limit_fs(control, kind, edge);
         let slack_fs = self.now_fs - since_fs - i64::from(limit_fs);
         let is_asynchronous = bank.is_asynchronous && kind.concerns_data();
         let tally = &mut self.summaries[kind as usize];

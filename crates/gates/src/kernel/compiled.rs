@@ -101,7 +101,7 @@ impl DelaySet {
     /// The sets of `timing` for the first output, in its order, and then those for a second output that differ from
     /// the first; and, by set of `timing`, where that of each output is. Cells look up one set where both are the same.
     pub(super) fn all(netlist: &Netlist, timing: &Timing) -> (Vec<Self>, Vec<[u32; 2]>) {
-        let by_value = |arc: &ArcDelay| Logic::ALL.map(|to| arc.to(to));
+        let by_value = |arc: &ArcDelay| Logic::ALL.map(|to| arc.delay_fs(to));
         let to_output = |set: &CellDelays, output: usize| {
             DelaySet(set.each_ref().map(|outputs| by_value(&outputs[output])))
         };
@@ -215,7 +215,7 @@ impl Loads {
     }
 
     #[inline]
-    pub(super) fn of(&self, net: usize) -> &[Load] {
+    pub(super) fn net_loads(&self, net: usize) -> &[Load] {
         &self.loads[self.range_of(net)]
     }
 
@@ -227,7 +227,7 @@ impl Loads {
 
     /// The load at a place.
     #[inline]
-    pub(super) fn at(&self, place: usize) -> Load {
+    pub(super) fn load(&self, place: usize) -> Load {
         self.loads[place]
     }
 }

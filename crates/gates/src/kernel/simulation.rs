@@ -263,7 +263,7 @@ impl Kernel {
             state.clock_before = value;
             let (net, value) = (NetId::new(net as usize), Logic::from_bits(value));
             observer.change(Time::from_fs(self.now_fs), net, value);
-            for &load in self.fan_out.active.of(net.index()) {
+            for &load in self.fan_out.active.net_loads(net.index()) {
                 let cell = &mut self.cells[load.cell()];
                 debug_assert!(!cell.kind.is_flip_flop(), "a reset or set");
                 let shift = 2 * load.pin();
@@ -354,12 +354,12 @@ impl Kernel {
         if value == Logic::Zero.bits() {
             self.nets[net].clock_before = value;
         } else if !self.nets[net].has_risen
-            && (!self.fan_out.clocks.of(net).is_empty() || self.clocks_a_bank(net))
+            && (!self.fan_out.clocks.net_loads(net).is_empty() || self.clocks_a_bank(net))
         {
             self.nets[net].has_risen = true;
             self.risen.push(net as u32);
         }
-        for &load in self.fan_out.active.of(net) {
+        for &load in self.fan_out.active.net_loads(net) {
             let cell = &mut self.cells[load.cell()];
             let shift = 2 * load.pin();
             cell.inputs = cell.inputs & !(3 << shift) | value << shift;
@@ -379,7 +379,7 @@ impl Kernel {
                 self.clock_bank(bank, observer);
             }
         }
-        let loads = self.fan_out.clocks.of(net);
+        let loads = self.fan_out.clocks.net_loads(net);
         self.statistics.evaluations += loads.len() as u64;
         let (cells, nets) = (&self.cells[..], &self.nets[..]);
         // Most hold already what they would take.

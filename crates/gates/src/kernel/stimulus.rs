@@ -65,7 +65,7 @@ impl<'a> Stimulus<'a> {
 
     /// Both together; `other` is in time order, too. Of drives at the same time, those that were here first come first.
     #[must_use]
-    pub fn with(self, other: impl IntoIterator<Item = Drive, IntoIter: Send + 'a>) -> Self {
+    pub fn with_drives(self, other: impl IntoIterator<Item = Drive, IntoIter: Send + 'a>) -> Self {
         Stimulus::merge([self, Stimulus::new(other)])
     }
 
@@ -137,7 +137,7 @@ mod tests {
         let a = [at(0, 0, true), at(5, 0, false)];
         let b = [at(0, 1, true), at(3, 1, false)];
         let merged: Vec<_> = Stimulus::new(a)
-            .with(b)
+            .with_drives(b)
             .map(|d| (d.time.as_fs(), d.net.index()))
             .collect();
         assert_eq!(merged, [(0, 0), (0, 1), (3, 1), (5, 0)]);

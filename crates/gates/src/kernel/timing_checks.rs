@@ -126,7 +126,7 @@ impl TimingChecks {
         let mut flip_flops = flip_flops(netlist);
         let banks = banks(&mut flip_flops);
         let limits = [CellKind::Dffr, CellKind::Dffsr]
-            .map(|kind| InstanceLimits::of(library.checks(kind), corner));
+            .map(|kind| InstanceLimits::from_library(library.checks(kind), corner));
         let unknown = History {
             rose_fs: NEVER,
             fell_fs: NEVER,

@@ -51,7 +51,10 @@ impl<'g, 't> Candidate<'g, 't> {
     ///
     /// # Errors
     /// An area that is not a number, and words that mean nothing.
-    pub(super) fn of(group: &'g Group<'t>, file: usize) -> Result<Option<Self>, LibertyError> {
+    pub(super) fn from_group(
+        group: &'g Group<'t>,
+        file: usize,
+    ) -> Result<Option<Self>, LibertyError> {
         let area = group.number("area")?.unwrap_or(0.0);
         let pins = || group.pins();
         let of_direction = |direction: &str| {

@@ -75,7 +75,7 @@ struct Nets {
 
 impl Nets {
     /// Slews at a cell's pins and loads at its outputs.
-    fn at(&self, cell: &FlatCell) -> Conditions {
+    fn conditions(&self, cell: &FlatCell) -> Conditions {
         let load = |net: NetId| self.loads[net.index()];
         let slew = |net: NetId| self.slews[net.index()];
         Conditions {
@@ -249,7 +249,7 @@ impl Characterised {
                 characterised.instance(alone, map, cell - block.cells.start)
             }
             _ => {
-                let conditions = self.nets.at(&netlist.cells()[cell]);
+                let conditions = self.nets.conditions(&netlist.cells()[cell]);
                 (composite(netlist, map, &self.drives, cell), conditions)
             }
         }
@@ -377,7 +377,7 @@ impl<'w> Work<'w> {
         let mut drives = self.drives.clone();
         for &cell in &self.outside {
             let chosen = &mut drives[cell];
-            let Conditions { loads, .. } = self.nets.at(&self.netlist.cells()[cell]);
+            let Conditions { loads, .. } = self.nets.conditions(&self.netlist.cells()[cell]);
             let recipe = self.composite(cell).recipe;
             // From the outputs back: what a stage drives is known.
             for stage in (0..recipe.stages.len()).rev() {
@@ -412,7 +412,9 @@ impl<'w> Work<'w> {
                 return;
             }
             let leaf = &self.netlist.cells()[cell];
-            let found = self.composite(cell).output_slews(&self.nets.at(leaf));
+            let found = self
+                .composite(cell)
+                .output_slews(&self.nets.conditions(leaf));
             let outputs = leaf.outputs;
             for (net, slew) in outputs.iter().zip(found) {
                 let (Some(net), Some(slew)) = (net, slew) else {
@@ -441,7 +443,7 @@ impl<'w> Work<'w> {
         }
         for &index in &self.outside {
             let cell = &self.netlist.cells()[index];
-            let (composite, conditions) = (self.composite(index), self.nets.at(cell));
+            let (composite, conditions) = (self.composite(index), self.nets.conditions(cell));
             let (delays, limits) = composite.characterise(cell.kind, &conditions);
             timing.set(index, delays);
             if cell.kind.is_flip_flop() {

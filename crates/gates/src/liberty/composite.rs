@@ -149,7 +149,9 @@ impl<'m> Composite<'m> {
                         continue;
                     };
                     let effect = arc.effect as usize;
-                    let slew = arc.slew.at(before[arc.cause as usize], load[effect]);
+                    let slew = arc
+                        .slew
+                        .interpolate(before[arc.cause as usize], load[effect]);
                     worst[effect] = Some(worst[effect].map_or(slew, |w: f64| w.max(slew)));
                 }
                 if let [rise, fall] = worst
@@ -176,10 +178,10 @@ impl<'m> Composite<'m> {
         let loads: Vec<ByEdge> = (0..cell.outputs.len())
             .map(|output| self.output_load(stage, output, loads))
             .collect();
-        let slews = cell
-            .arcs
-            .iter()
-            .map(|arc| arc.slew.at(slew, loads[arc.to][arc.effect as usize]));
+        let slews = cell.arcs.iter().map(|arc| {
+            arc.slew
+                .interpolate(slew, loads[arc.to][arc.effect as usize])
+        });
         slews.fold(0.0, f64::max)
     }
 
@@ -204,7 +206,7 @@ impl<'m> Composite<'m> {
                     continue;
                 };
                 let load = self.output_load(stage, arc.to, &conditions.loads)[effect];
-                let time = time + arc.delay.at(slew[cause], load);
+                let time = time + arc.delay.interpolate(slew[cause], load);
                 let worst = &mut times[MAX_INPUTS + 2 * stage + arc.to][effect];
                 *worst = Some(worst.map_or(time, |w: f64| w.max(time)));
             }
@@ -225,7 +227,7 @@ impl<'m> Composite<'m> {
                 continue;
             };
             let load = self.output_load(stage, arc.to, &conditions.loads)[arc.effect as usize];
-            let delay = arc.delay.at(slew[arc.cause as usize], load);
+            let delay = arc.delay.interpolate(slew[arc.cause as usize], load);
             let slowest: &mut f64 = delays
                 .entry((arc.from, arc.to, arc.effect))
                 .or_insert(delay);
@@ -262,7 +264,10 @@ impl<'m> Composite<'m> {
                 let ours = |e: &&CellEnergy| e.to == to && (only.is_none() || e.from == only);
                 let each = cell.energies.iter().filter(ours).map(|energy| {
                     let (weight, slew) = at(energy.from.unwrap_or(0), changes);
-                    let [rise, fall] = energy.of.each_ref().map(|table| table.at(slew, load));
+                    let [rise, fall] = energy
+                        .of
+                        .each_ref()
+                        .map(|table| table.interpolate(slew, load));
                     (weight, 0.5 * (rise + fall))
                 });
                 let (mut sum, mut weights, mut plain, mut count) = (0.0, 0.0, 0.0, 0.0);
@@ -415,12 +420,12 @@ impl<'m> Composite<'m> {
             let apart = late - clock_late;
             let need = match check.kind {
                 CheckKind::Setup | CheckKind::Recovery => {
-                    check.limit.at(clock_slew, own_slew) + apart
+                    check.limit.interpolate(clock_slew, own_slew) + apart
                 }
                 CheckKind::Hold | CheckKind::Removal => {
-                    check.limit.at(clock_slew, own_slew) - apart
+                    check.limit.interpolate(clock_slew, own_slew) - apart
                 }
-                _ => check.limit.at(own_slew, own_slew),
+                _ => check.limit.interpolate(own_slew, own_slew),
             };
             let need = whole_fs(need.max(0.0));
             let controls: &[Control] = match outer {
@@ -436,7 +441,7 @@ impl<'m> Composite<'m> {
             };
             for &control in controls {
                 for &edge in edges {
-                    let known = limits.at(control, check.kind, edge);
+                    let known = limits.limit_fs(control, check.kind, edge);
                     limits.set(control, check.kind, edge, known.max(need));
                 }
             }

@@ -100,7 +100,7 @@ fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io:
         };
         let values: BTreeSet<bool> = (0..1 << function.inputs)
             .filter(fits)
-            .map(|packed| function.at(packed))
+            .map(|packed| function.value(packed))
             .collect();
         if let (1, Some(&value)) = (values.len(), values.first()) {
             let levels = (0..function.inputs).map(|pin| ["0 ", "1 ", "x "][level(pin) as usize]);

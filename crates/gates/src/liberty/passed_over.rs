@@ -31,7 +31,7 @@ pub struct PassedOver {
 
 impl PassedOver {
     /// A cell that is no candidate, or a gate that the library says not to use and that is not `wanted` by name.
-    pub(super) fn of(
+    pub(super) fn from_group(
         file: &LibraryFile<'_, '_>,
         group: &Group<'_>,
         candidate: Option<&Candidate<'_, '_>>,

@@ -74,8 +74,13 @@ impl Liberty {
                     continue;
                 }
                 lines.insert(cell.name(), cell.line);
-                let candidate = Candidate::of(cell, index).map_err(in_file(index))?;
-                passed_over.extend(PassedOver::of(file, cell, candidate.as_ref(), wanted));
+                let candidate = Candidate::from_group(cell, index).map_err(in_file(index))?;
+                passed_over.extend(PassedOver::from_group(
+                    file,
+                    cell,
+                    candidate.as_ref(),
+                    wanted,
+                ));
                 candidates.extend(candidate);
             }
         }

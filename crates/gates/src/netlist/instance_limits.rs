@@ -37,7 +37,7 @@ impl InstanceLimits {
     pub(crate) fn of_kind(&self) -> CheckLimits {
         let of = |check, edge| {
             let controls = [Control::Reset, Control::Set];
-            let limits = controls.map(|control| self.at(control, check, edge));
+            let limits = controls.map(|control| self.limit_fs(control, check, edge));
             Delay::fixed(limits[0].max(limits[1]))
         };
         let data = |check| DataLimit {
@@ -57,14 +57,14 @@ impl InstanceLimits {
     }
 
     /// What the library says in one corner.
-    pub(crate) fn of(limits: &CheckLimits, corner: Corner) -> Self {
+    pub(crate) fn from_library(limits: &CheckLimits, corner: Corner) -> Self {
         let by_edge = |check| Edge::BOTH.map(|edge| limits.toward(check, edge, corner));
         InstanceLimits([CheckKind::ALL.map(by_edge); 2])
     }
 
     /// One limit, fs.
     #[inline]
-    pub const fn at(&self, control: Control, check: CheckKind, edge: Edge) -> u32 {
+    pub const fn limit_fs(&self, control: Control, check: CheckKind, edge: Edge) -> u32 {
         self.0[control as usize][check as usize][edge as usize]
     }
 

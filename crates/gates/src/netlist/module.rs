@@ -122,7 +122,7 @@ impl Module {
 
 impl Names {
     /// The names of a complete module.
-    pub(crate) fn of(module: &Module) -> Self {
+    pub(crate) fn new(module: &Module) -> Self {
         let index = |i: usize| i as u32;
         let mut scopes = 1;
         let mut instances = HashMap::with_capacity(module.instances.len());

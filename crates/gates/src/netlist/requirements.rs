@@ -95,7 +95,7 @@ impl<'n> Requirements<'n> {
     ///
     /// # Errors
     /// When edges come back to where they were without meeting a barrier.
-    pub fn of(
+    pub fn new(
         netlist: &'n Netlist,
         analysis: &StaticTiming<'n>,
         clock: NetId,
@@ -252,7 +252,7 @@ mod tests {
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();
         let found =
-            Requirements::of(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
+            Requirements::new(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
         let second =
             |r: &&Requirement| netlist.cell_path(r.cell) == "pair.second" && r.kind == kind;
         let worst = found.all().iter().filter(second).max_by_key(|r| r.need);
@@ -297,7 +297,7 @@ mod tests {
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();
         let found =
-            Requirements::of(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
+            Requirements::new(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
         for edge in Edge::BOTH {
             let is_its = |r: &&Requirement| r.kind == CheckKind::Hold && r.edge == edge;
             let need = found.all().iter().find(is_its).unwrap().need;

@@ -122,7 +122,7 @@ pub fn varied_as(
         let mismatch = mismatch.filter(|_| !wires.contains(&index));
         let own = mismatch.map_or(1.0, |m| m.factor(&path(index), cell.kind.transistors()));
         let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
-        let mut delays = *nominal.of(index);
+        let mut delays = *nominal.cell_delays(index);
         for arc in delays.as_flattened_mut() {
             arc.rise_fs = scale(arc.rise_fs);
             arc.fall_fs = scale(arc.fall_fs);

@@ -60,14 +60,14 @@ impl<'a> Parser<'a, '_> {
     fn rise_and_fall(&mut self, may_be_negative: bool) -> Result<(Triple, Triple)> {
         let mut values = Vec::new();
         while self.is_next(Token::Open)? {
-            self.take()?;
+            self.next_token()?;
             if matches!(self.peek()?, Token::Word(w) if w.eq_ignore_ascii_case("RETAIN")) {
                 Skipped::count(&mut self.skipped, "RETAIN", self.line);
                 self.skip_list()?;
                 continue;
             }
             let value = if self.is_next(Token::Open)? {
-                self.take()?;
+                self.next_token()?;
                 let value = self.triple()?;
                 if !self.is_next(Token::Close)? {
                     Skipped::count(&mut self.skipped, "pulse limits", self.line);
@@ -101,7 +101,7 @@ impl<'a> Parser<'a, '_> {
         let mut members = [None; 3];
         let mut at = 0;
         loop {
-            match self.take()? {
+            match self.next_token()? {
                 Token::Close => break,
                 Token::Colon if at < 2 => at += 1,
                 Token::Word(word) if members[at].is_none() => {
@@ -141,7 +141,7 @@ impl<'a> Parser<'a, '_> {
             let pin = self.name("a pin")?;
             return Ok(PinEdge { edge: None, pin });
         }
-        self.take()?;
+        self.next_token()?;
         let edge = match self.word("an edge")?.to_ascii_lowercase().as_str() {
             "posedge" | "01" => Edge::Rise,
             "negedge" | "10" => Edge::Fall,
@@ -204,7 +204,7 @@ impl<'a> Parser<'a, '_> {
             let mut beyond = self.tokens.clone();
             if matches!(beyond.next(), Ok((Token::Word(w), _)) if w.eq_ignore_ascii_case("COND")) {
                 *conditional = true;
-                self.take()?;
+                self.next_token()?;
                 self.skip_list()?;
                 let pin = Cow::Borrowed("");
                 return Ok(PinEdge { edge: None, pin });

@@ -80,7 +80,7 @@ impl Triple {
     }
 
     /// The member of one corner, fs.
-    pub const fn at(self, corner: Corner) -> Option<i64> {
+    pub const fn in_corner_fs(self, corner: Corner) -> Option<i64> {
         self.0[corner as usize]
     }
 }
@@ -127,7 +127,7 @@ impl SdfDelay<'_> {
     pub fn has_value(&self, corner: Corner) -> bool {
         [self.rise, self.fall]
             .iter()
-            .any(|value| value.at(corner).is_some())
+            .any(|value| value.in_corner_fs(corner).is_some())
     }
 }
 
@@ -202,7 +202,9 @@ pub struct SdfCheck<'a> {
 impl SdfCheck<'_> {
     /// Whether it gives a limit for a corner.
     pub fn has_value(&self, corner: Corner) -> bool {
-        self.limits.iter().any(|limit| limit.at(corner).is_some())
+        self.limits
+            .iter()
+            .any(|limit| limit.in_corner_fs(corner).is_some())
     }
 }
 

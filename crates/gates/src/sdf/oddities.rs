@@ -70,7 +70,8 @@ pub fn oddities(sdf: &Sdf<'_>, corner: Corner) -> Vec<Oddity> {
         let is_of_cell = matches!(delay.path, DelayPath::IoPath(..) | DelayPath::Device(_));
         is_of_cell && !delay.increment
     };
-    let given = |delay: &SdfDelay<'_>| [delay.rise, delay.fall].map(|delay| delay.at(corner));
+    let given =
+        |delay: &SdfDelay<'_>| [delay.rise, delay.fall].map(|delay| delay.in_corner_fs(corner));
     let arcs = sdf.cells.iter().flat_map(|cell| &cell.delays);
     let arcs = arcs
         .filter(is_arc)

@@ -183,7 +183,7 @@ pub struct Every {
 impl Every {
     /// The `n`-th of them; the first is number 0, at time 0.
     #[inline]
-    pub fn at(&self, n: u32) -> Time {
+    pub fn time(&self, n: u32) -> Time {
         let half = self.modulus / 2;
         let short = self.rest.checked_mul(n.into());
         let rest = match short.and_then(|rest| rest.checked_add(half)) {
@@ -289,7 +289,7 @@ mod tests {
             let f = Frequency::from_hz_f64(hz).unwrap();
             let k = i64::from(n) * i64::from(periods);
             prop_assume!((k as f64) < 9e3 * hz);
-            prop_assert_eq!(f.every(periods).at(n), f.periods(k));
+            prop_assert_eq!(f.every(periods).time(n), f.periods(k));
         }
 
         #[test]

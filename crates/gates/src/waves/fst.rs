@@ -70,7 +70,7 @@ impl<W: Read + Write + Seek> FstWriter<W> {
             stamped: Time::ZERO,
             error: None,
         };
-        Ok(WaveWriter::of(fst, netlist, variables))
+        Ok(WaveWriter::from_variables(fst, netlist, variables))
     }
 }
 

@@ -97,7 +97,7 @@ impl Layout {
             one_line(&group.title)?;
             writeln!(out, "@800200\n-{}", group.title)?;
             for entry in &group.signals {
-                let range = Shape::of(netlist, &entry.path)?.range();
+                let range = Shape::find(netlist, &entry.path)?.range();
                 let flags = entry.radix.flags();
                 writeln!(out, "{flags}")?;
                 if let Some(alias) = &entry.alias {
@@ -118,7 +118,7 @@ impl Layout {
             // A brace and a space mark a group.
             name = name.max(group.title.chars().count() + 2);
             for entry in &group.signals {
-                let shape = Shape::of(netlist, &entry.path)?;
+                let shape = Shape::find(netlist, &entry.path)?;
                 let last = entry.path.rsplit('.').next().unwrap_or_default();
                 let own = last.len() + shape.range().len();
                 let alias = entry.alias.as_ref().map(|alias| alias.chars().count());

@@ -137,7 +137,7 @@ impl Shape {
     ///
     /// # Errors
     /// When `netlist` has none.
-    pub(super) fn of(netlist: &Netlist, path: &str) -> io::Result<Self> {
+    pub(super) fn find(netlist: &Netlist, path: &str) -> io::Result<Self> {
         let (scope, name) = path.rsplit_once('.').unwrap_or(("", path));
         let signal = netlist
             .scope(scope)

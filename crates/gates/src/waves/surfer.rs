@@ -54,7 +54,7 @@ impl Layout {
             writeln!(out, "divider_add {}", one_word(&group.title))?;
             items += 1;
             for entry in &group.signals {
-                let shape = Shape::of(netlist, &entry.path)?;
+                let shape = Shape::find(netlist, &entry.path)?;
                 writeln!(out, "variable_add {top}.{}", entry.path)?;
                 if shape.width > 1 {
                     writeln!(out, "item_focus {}_", letters(items))?;

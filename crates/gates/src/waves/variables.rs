@@ -90,7 +90,7 @@ impl Variables {
             for signal in scope.module.signals() {
                 if signal.width() > 0 && (signal.is_named || selection.includes_anonymous()) {
                     let nets = netlist.signal_nets(scope, signal).rev();
-                    let (variable, is_alias) = variables.of(nets.map(index_of).collect());
+                    let (variable, is_alias) = variables.find_or_add(nets.map(index_of).collect());
                     out.signal(&Declaration {
                         name: &signal.name,
                         width: signal.width() as u32,
@@ -108,7 +108,7 @@ impl Variables {
     }
 
     /// The variable of these nets, most significant first, and whether there was one before.
-    fn of(&mut self, nets: Vec<u32>) -> (u32, bool) {
+    fn find_or_add(&mut self, nets: Vec<u32>) -> (u32, bool) {
         let known = match nets[..] {
             [net] => self.scalar_of_net[net as usize],
             _ => self.buses.get(&nets).copied().unwrap_or(NO_VARIABLE),

@@ -53,7 +53,7 @@ impl<W: Write> VcdWriter<W> {
             lines,
             stamp: Stamp::new(),
         };
-        Ok(WaveWriter::of(vcd, netlist, variables))
+        Ok(WaveWriter::from_variables(vcd, netlist, variables))
     }
 }
 

@@ -219,7 +219,7 @@ fn place(to: &mut Placing<'_>, given: &Given<'_>) -> Result<bool, YosysError> {
         library::place(to, given, function)?;
         return Ok(true);
     }
-    if let Some(flip_flop) = FlipFlop::of(kind) {
+    if let Some(flip_flop) = FlipFlop::from_cell_kind(kind) {
         flip_flop.place(to, given)?;
         return Ok(true);
     }
@@ -293,7 +293,7 @@ pub(super) struct FlipFlop {
 
 impl FlipFlop {
     /// What the name of a cell says, if it is a flip-flop's.
-    pub(super) fn of(kind: &str) -> Option<Self> {
+    pub(super) fn from_cell_kind(kind: &str) -> Option<Self> {
         let (family, letters) = kind
             .strip_prefix("$_")?
             .strip_suffix('_')?

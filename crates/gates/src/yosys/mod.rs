@@ -324,7 +324,7 @@ fn is_ours(name: &str) -> bool {
 
 impl Placed {
     fn is_flip_flop(&self) -> bool {
-        FlipFlop::of(&self.kind).is_some()
+        FlipFlop::from_cell_kind(&self.kind).is_some()
     }
 
     /// The nets of an inverter.

@@ -35,10 +35,10 @@ struct Bench {
 
 impl Bench {
     fn new(text: &str) -> Self {
-        Self::of(text, None)
+        Self::from_text(text, None)
     }
 
-    fn of(text: &str, library: Option<&Liberty>) -> Self {
+    fn from_text(text: &str, library: Option<&Liberty>) -> Self {
         let module = Module::from_yosys_of(text, None, library).unwrap();
         let netlist = Netlist::elaborate(&module);
         let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
@@ -277,7 +277,7 @@ fn cells_of_a_library_do_what_it_says() {
     let library = &library();
     for (kind, pins, law) in gates {
         let output = if kind == "NAND2_4" { "Y" } else { "Z" };
-        let mut bench = Bench::of(&cell(kind, pins, output), Some(library));
+        let mut bench = Bench::from_text(&cell(kind, pins, output), Some(library));
         for bits in 0..1u32 << pins.len() {
             let values: Vec<bool> = (0..pins.len()).map(|pin| bits >> pin & 1 == 1).collect();
             let inputs: Vec<_> = pins.iter().copied().zip(values.iter().copied()).collect();
@@ -290,7 +290,8 @@ fn cells_of_a_library_do_what_it_says() {
         }
     }
     for (output, inverts) in [("Q", false), ("QN", true)] {
-        let mut bench = Bench::of(&cell("DFFNS_1", &["CKN", "D", "SN"], output), Some(library));
+        let mut bench =
+            Bench::from_text(&cell("DFFNS_1", &["CKN", "D", "SN"], output), Some(library));
         let mut is = |inputs: &[(&str, bool)], state: bool| {
             let wanted = if state != inverts {
                 Logic::One

@@ -116,7 +116,7 @@ fn limits_of_a_flip_flop() {
     let slew = environment.input_slew_fs * 1e-6;
     let made = Characterised::new(&netlist, &library, &environment);
     let limits = made.timing.limits(0, CellKind::Dffr);
-    let limit = |kind, edge| limits.at(Control::Reset, kind, edge);
+    let limit = |kind, edge| limits.limit_fs(Control::Reset, kind, edge);
     for (kind, [rise_fs, fall_fs]) in [
         (CheckKind::Setup, [25_000, 30_000]),
         (CheckKind::Hold, [4_000, 2_000]),

@@ -146,7 +146,7 @@ fn capacitance_of_outputs_is_a_load() {
             wire_ff: 0.0,
         };
         let made = Characterised::new(&netlist, &library, &environment);
-        let arc = made.timing.of(0)[0][0];
+        let arc = made.timing.cell_delays(0)[0][0];
         [arc.rise_fs, arc.fall_fs].map(f64::from)
     };
     let before = delays(&text());

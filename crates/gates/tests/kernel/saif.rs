@@ -197,7 +197,8 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
                 let causes = (0..pins.len()).filter(|&pin| {
                     cell.kind.triggers(pin) && !is_fall(pin) && now[pin] != value(pin, time - 1)
                 });
-                let delays = causes.map(|pin| i64::from(timing.of(index)[pin][which].to(next)));
+                let delays = causes
+                    .map(|pin| i64::from(timing.cell_delays(index)[pin][which].delay_fs(next)));
                 let due = time + delays.min().unwrap();
                 on_their_way.retain(|&(arrives, _)| arrives > time);
                 let stays = match timing.model(index) {

@@ -186,7 +186,7 @@ impl<R: BufRead> Lines<R> {
             } else {
                 0
             };
-            let complain = |message| Err(InputError::at(&self.source, self.number, message));
+            let complain = |message| Err(InputError::at_line(&self.source, self.number, message));
             if let Some(message) = flaw(&self.bytes, is_first) {
                 return complain(message);
             }
@@ -210,7 +210,7 @@ impl<R: BufRead> Lines<R> {
                 Ok(line) => Ok(Some((self.number, line.trim()))),
                 Err(_) => {
                     let message = "ends within a character; give a whole text file, saved as UTF-8";
-                    Err(InputError::at(&self.source, self.number, message))
+                    Err(InputError::at_line(&self.source, self.number, message))
                 }
             };
         }
@@ -255,7 +255,7 @@ pub fn parse_toml<T: DeserializeOwned>(
         match e.span() {
             Some(span) => {
                 let line = LineEnds::of(text).line_of(span.start);
-                InputError::at(source, line, message)
+                InputError::at_line(source, line, message)
             }
             None => InputError::new(source, message),
         }
@@ -285,7 +285,7 @@ pub fn parse_json<T: DeserializeOwned>(
             None if e.is_eof() => "the text ends early".to_owned(),
             None => "this is no JSON".to_owned(),
         };
-        InputError::at(source, e.line(), format!("{what}; give {wanted}"))
+        InputError::at_line(source, e.line(), format!("{what}; give {wanted}"))
     })
 }
 

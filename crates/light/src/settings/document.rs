@@ -236,7 +236,7 @@ impl Document {
             .collect();
         placed.sort_by(|a, b| a.0.cmp(&b.0));
         InputError::all(placed.into_iter().map(|(origin, message)| match origin {
-            Some(Origin::Line(line)) => InputError::at(&self.source, line, message),
+            Some(Origin::Line(line)) => InputError::at_line(&self.source, line, message),
             Some(Origin::Option(option)) => about_option(&option, message),
             None => InputError::new(&self.source, message),
         }))
@@ -285,7 +285,7 @@ fn about_option(option: &str, message: String) -> InputError {
         let numbered = rest[1..].split_once(": ");
         let line = numbered.and_then(|(line, rest)| Some((line.parse().ok()?, rest)));
         Some(match line {
-            Some((line, rest)) => InputError::at(file, line, rest),
+            Some((line, rest)) => InputError::at_line(file, line, rest),
             None => InputError::new(file, rest.strip_prefix(": ")?),
         })
     };

@@ -117,7 +117,7 @@ impl Curve {
             let columns: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
             let values: Vec<f64> = columns.iter().filter_map(|c| c.parse().ok()).collect();
             let is_header = std::mem::take(&mut may_be_header) && values.is_empty();
-            let complain = |message| Err(InputError::at(&source, number, message));
+            let complain = |message| Err(InputError::at_line(&source, number, message));
             match (columns.len(), <[f64; 2]>::try_from(&values[..])) {
                 (2, Ok(_)) if points.len() == MOST_POINTS => {
                     return complain(format!(

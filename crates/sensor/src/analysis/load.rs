@@ -43,7 +43,7 @@ impl LoadTiming {
         let requirements = |cuts: &[NetId]| {
             let corner = silicon.corner;
             let clock = LoadProbe::Clk.net(&netlist);
-            Requirements::of(&netlist, &analysis, clock, cuts, &library, corner)
+            Requirements::new(&netlist, &analysis, clock, cuts, &library, corner)
                 .expect("the load path has no loop")
         };
         // The inverse of ROW_DONE clocks the tokens and gates WRITE.

@@ -119,7 +119,7 @@ impl MacropixelTiming {
         let (hits, clk_rest) = circuit.split(clk.all(), !is_library);
         let limit = |kind: CheckKind| {
             let limits = library.checks(CellKind::Dffr);
-            Time::from_fs(limits.at(kind, corner).into())
+            Time::from_fs(limits.limit_fs(kind, corner).into())
         };
         let whole = "the macropixel connects these";
         MacropixelTiming {
@@ -137,7 +137,7 @@ impl MacropixelTiming {
             counter_clk_high: circuit
                 .clocked_by_counter_clk()
                 .map(|cell| library.checks(netlist.cells()[cell].kind))
-                .map(|checks| Time::from_fs(checks.at(CheckKind::ClockHigh, corner).into()))
+                .map(|checks| Time::from_fs(checks.limit_fs(CheckKind::ClockHigh, corner).into()))
                 .max()
                 .expect("a P-counter counts"),
             reset: delays.reset,
@@ -394,7 +394,7 @@ impl LocalClocks {
         let requirements = |clock: NetId, cuts: &[NetId]| {
             let corner = silicon.corner;
             let analysis = paths.analysis();
-            let found = Requirements::of(netlist, analysis, clock, cuts, &library, corner);
+            let found = Requirements::new(netlist, analysis, clock, cuts, &library, corner);
             found.expect("every loop is cut").all().to_vec()
         };
         // A count's Q only tells whether the bin is full; what else one's own histogram does with it, nobody knows.

@@ -49,7 +49,7 @@ impl ReadTiming {
         let pins = ReadPins::of(&netlist);
         let words = ReadProbe::Word.bus(&netlist);
         let requirements = |cuts: &[NetId]| {
-            Requirements::of(
+            Requirements::new(
                 &netlist,
                 &analysis,
                 pins.clk,

@@ -200,7 +200,7 @@ impl GateSimulation {
         let pins = ReadPins::of(&self.netlist);
         let (clock, start) = (self.sensor.read_clock(), self.kernel.now());
         let (end, read) = read_stimulus(&pins, clock, start, order.periods());
-        let mut stimulus = read.with(others);
+        let mut stimulus = read.with_drives(others);
         let mut sampler = PinSampler::new(&self.netlist, |net| self.kernel.value(net));
         let mut observers = (&mut sampler, observer);
         let settled = end.max(others_end) + clock.period();

@@ -124,7 +124,7 @@ pub fn read_out(
     let order = ReadoutOrder::of(config);
     let pins = ReadPins::of(netlist);
     let (end, read) = read_stimulus(&pins, config.read_clock(), READ_ENABLED, order.periods());
-    let mut stimulus = Stimulus::sorted(power_up(netlist, &order, counts)).with(read);
+    let mut stimulus = Stimulus::sorted(power_up(netlist, &order, counts)).with_drives(read);
     let mut kernel = Kernel::new(netlist, &Silicon::of(config).timing(netlist));
     let mut sampler = PinSampler::new(netlist, |_| Logic::X);
     kernel

@@ -33,7 +33,7 @@ pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histogra
         if cells.first() != Some(&"Agg") {
             continue;
         }
-        let complain = |message: String| InputError::at(path.display(), 1 + number, message);
+        let complain = |message: String| InputError::at_line(path.display(), 1 + number, message);
         let cured = "give `Agg, zone, word, ambient, word, values`";
         let zone = cells.get(1).and_then(|cell| cell.parse::<usize>().ok());
         let ambient = cells.get(3).and_then(|cell| cell.parse::<f64>().ok());

@@ -53,7 +53,7 @@ fn read_lines(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u
     let (mut bins, mut counts) = (0, Vec::new());
     let mut is_first = true;
     while let Some((number, line)) = lines.next_used()? {
-        let complain = |message: String| InputError::at(path.display(), number, message);
+        let complain = |message: String| InputError::at_line(path.display(), number, message);
         let cells: Vec<&str> = cells_of(line);
         let is_heading = is_first && cells.iter().all(|cell| cell.parse::<f64>().is_err());
         is_first = false;

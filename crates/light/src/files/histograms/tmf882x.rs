@@ -38,7 +38,7 @@ pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
         let Some(rest) = line.trim().strip_prefix("#Raw,") else {
             continue;
         };
-        let complain = |message: String| InputError::at(path.display(), 1 + number, message);
+        let complain = |message: String| InputError::at_line(path.display(), 1 + number, message);
         let cells: Vec<&str> = rest
             .split(',')
             .map(str::trim)

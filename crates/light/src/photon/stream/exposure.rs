@@ -90,7 +90,7 @@ impl PhotonStream {
     /// Start of laser cycle `cycle`, exact to the femtosecond.
     #[inline]
     pub fn cycle_start(&self, cycle: u32) -> Time {
-        self.starts.at(cycle)
+        self.starts.time(cycle)
     }
 
     /// When the photons of a cycle begin and end, fs after its start.

@@ -135,7 +135,7 @@ impl Mesh {
         let lines = reader.lines;
         let (models, _) = loaded.map_err(|e| {
             let message = format!("is a broken OBJ here ({e}); save it again, with its triangles");
-            InputError::at(path.display(), lines.max(1), message)
+            InputError::at_line(path.display(), lines.max(1), message)
         })?;
         let listed = Listed::of_models(models).map_err(|CrossedFace(at)| {
             let message = format!(

@@ -173,7 +173,7 @@ impl FromFile {
                 .or_insert_with(|| scope.module.cell(front_end::TOGGLE));
             let Some(toggle) = *toggle else { continue };
             let cell = netlist.cells_of(index).start + toggle;
-            let mut delays = *timing.of(cell);
+            let mut delays = *timing.cell_delays(cell);
             for arc in delays.as_flattened_mut() {
                 let slower = arc.rise_fs.max(arc.fall_fs);
                 (arc.rise_fs, arc.fall_fs) = (slower, slower);

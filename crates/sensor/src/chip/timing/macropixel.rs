@@ -360,8 +360,8 @@ impl<'c> MacropixelPaths<'c> {
 
     /// Clock → an output rises, falls, of one flip-flop.
     fn clock_to_q(&self, cell: usize, output: usize) -> (Time, Time) {
-        let clock = self.timing.of(cell)[1][output];
-        let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.to(to).into()));
+        let clock = self.timing.cell_delays(cell)[1][output];
+        let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.delay_fs(to).into()));
         (rise, fall)
     }
 
@@ -428,7 +428,7 @@ impl<'c> MacropixelPaths<'c> {
             .map(|(cell, leaf)| {
                 let pins = 0..leaf.kind.inputs().len();
                 let arcs = pins.filter(|&pin| leaf.kind.triggers(pin)).flat_map(|pin| {
-                    let arcs = &self.timing.of(cell)[pin][..leaf.kind.outputs().len()];
+                    let arcs = &self.timing.cell_delays(cell)[pin][..leaf.kind.outputs().len()];
                     arcs.iter().flat_map(|arc| [arc.rise_fs, arc.fall_fs])
                 });
                 let arcs = arcs.map(|fs| Time::from_fs(fs.into()));

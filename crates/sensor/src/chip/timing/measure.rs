@@ -67,7 +67,8 @@ impl ResetPulse {
         (delays, counter): (&MacropixelDelays, &CounterDelays),
         (library, corner): (&Library, Corner),
     ) -> Self {
-        let limit_of = |kind, check| Time::from_fs(library.checks(kind).at(check, corner).into());
+        let limit_of =
+            |kind, check| Time::from_fs(library.checks(kind).limit_fs(check, corner).into());
         let limit = |check| {
             let limits = circuit.counting_kinds().map(|kind| limit_of(kind, check));
             limits.max().expect("a P-counter counts")
@@ -128,7 +129,7 @@ impl MeasuredDelays {
         let clk = Requirements::behind(&circuit.netlist, clk, &library, silicon.corner);
         let (_, clk) = circuit.split(clk.all(), false);
         let limit_of = |kind, check| {
-            let limit = library.checks(kind).at(check, silicon.corner);
+            let limit = library.checks(kind).limit_fs(check, silicon.corner);
             Time::from_fs(limit.into())
         };
         // SPADs, SHIFT and HIT have flip-flops of this kind.

@@ -391,7 +391,9 @@ fn fastest_cell_fs(survey: &Survey) -> i64 {
     let cells = survey.netlist.cells().iter().enumerate();
     let delays = cells.flat_map(|(index, cell)| {
         let pins = (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin));
-        pins.flat_map(move |pin| &survey.timing.of(index)[pin][..cell.kind.outputs().len()])
+        pins.flat_map(move |pin| {
+            &survey.timing.cell_delays(index)[pin][..cell.kind.outputs().len()]
+        })
     });
     delays
         .map(|arc| i64::from(arc.rise_fs.min(arc.fall_fs)))

@@ -102,7 +102,7 @@ impl<'n> CountDown<'n> {
         expected: Expected,
     ) -> Self {
         let slowest = |cell: usize| {
-            let arcs = timing.of(cell).as_flattened().iter();
+            let arcs = timing.cell_delays(cell).as_flattened().iter();
             arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
                 .max()
                 .unwrap_or(0)

@@ -76,7 +76,7 @@ impl Model {
         };
         let delay = |name: &str, pin: usize, to| {
             let cell = cell(name).expect("a ring has its cells");
-            Time::from_fs(timing.of(cell)[pin][0].to(to).into())
+            Time::from_fs(timing.cell_delays(cell)[pin][0].delay_fs(to).into())
         };
         let inverters = (1..).map(|stage| format!("ring_{stage}"));
         let inverters = inverters.take_while(|name| cell(name).is_some());

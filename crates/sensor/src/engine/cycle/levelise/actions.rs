@@ -107,7 +107,7 @@ impl Leveliser<'_> {
         }
         // Where the flip-flop's clock comes is told by the delay with which it was given its place.
         let to_output = self.longest_delay(index, CLOCK);
-        let of_register = &survey.timing.of(register)[CLOCK][output];
+        let of_register = &survey.timing.cell_delays(register)[CLOCK][output];
         let (rise, fall) = (
             i64::from(of_register.rise_fs),
             i64::from(of_register.fall_fs),
@@ -120,8 +120,8 @@ impl Leveliser<'_> {
         let limit = |limit: DataLimit| {
             let longest = limit
                 .rise
-                .at(self.config.corner)
-                .max(limit.fall.at(self.config.corner));
+                .in_corner_fs(self.config.corner)
+                .max(limit.fall.in_corner_fs(self.config.corner));
             i64::from(longest) + ROUNDING_FS
         };
         let before = self.period_fs - after - (rise - fall).abs();
