@@ -94,7 +94,7 @@ fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<Kept, GuideError> {
     let mut all = Kept::default();
     for frame in 0..frames {
         let (now_s, seed) = (f64::from(frame), u64::from(frame));
-        let now = scene.at(now_s);
+        let now = scene.snapshot(now_s);
         let truth = GroundTruth::render(&now, SIZE, SIZE);
         let past = |number: usize| past(scene, now_s - FRAME_S * number as f64, seed, number);
         let earlier: Vec<PastFrame> = if looks_back {
@@ -113,7 +113,7 @@ fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<Kept, GuideError> {
 }
 
 fn past(scene: &Scene, time_s: f64, seed: u64, number: usize) -> PastFrame {
-    let truth = GroundTruth::render(&scene.at(time_s), SIZE, SIZE);
+    let truth = GroundTruth::render(&scene.snapshot(time_s), SIZE, SIZE);
     let ranges = (0u32..).zip(&truth.range_m).map(|(pixel, range_m)| {
         let mut random = random_stream(seed, Purpose::Guide, pixel, DRAWS + number as u32);
         range_m.map(|range_m| range_m + DEPTH_SIGMA_M * normal(&mut random))

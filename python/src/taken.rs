@@ -35,8 +35,8 @@ impl Taken {
         frame: Frame,
     ) -> Self {
         let report = move || {
-            let silicon = Silicon::of(&settings.sensor);
-            let timing = TimingVerdict::of(&settings.sensor, &silicon, (0, 0)).report();
+            let silicon = Silicon::new(&settings.sensor);
+            let timing = TimingVerdict::analyse(&settings.sensor, &silicon, (0, 0)).report();
             let of = (&request, &settings, &timing, &frame);
             let report = FrameReport::<()>::new(scene_name, of.0, of.1, of.2, of.3, None);
             let text = |json: serde_json::Result<String>| json.expect("a report is JSON");
@@ -52,7 +52,7 @@ impl Taken {
 #[pymethods]
 impl Taken {
     #[new]
-    fn of(report: String, configuration: String) -> Self {
+    fn unpickled(report: String, configuration: String) -> Self {
         Taken {
             report: LazyLock::new(Box::new(|| (report, configuration))),
         }

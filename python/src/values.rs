@@ -203,7 +203,7 @@ pub(crate) fn reassigned(
     table: Table,
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Document> {
-    let mut document = Document::of(name, table);
+    let mut document = Document::from_table(name, table);
     for assignment in assignments("", keys)? {
         let place = format!("with_({assignment})");
         document

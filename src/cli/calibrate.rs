@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::{progress, tell};
+use super::voice::{progress, say_unless_quiet};
 use crate::chip::{Tdc, WindowLaw};
 use crate::files::{InputError, OutputFile, refuse_input};
 use crate::numerics::intervals::mean_and_sigma;
@@ -95,7 +95,7 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         serde_json::to_writer(&mut *out, &found.profile)?;
         writeln!(out)
     })?;
-    tell(table(&found))?;
+    say_unless_quiet(table(&found))?;
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::voice::{announce, notes, progress, tell};
+use super::voice::{announce, notes, progress, say_unless_quiet};
 use crate::demo::disturbed::{Disturbance, Outcome};
 use crate::demo::show::{Show, Shown};
 use crate::demo::{Demonstrator, limit, shows, sweep};
@@ -198,7 +198,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         began.elapsed().as_secs_f64(),
         out.display(),
     );
-    Ok(tell(text)?)
+    Ok(say_unless_quiet(text)?)
 }
 
 fn file_names(folder: &Path) -> std::io::Result<String> {

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
-use super::voice::{announce, notes, progress, say_file, tell};
+use super::voice::{announce, notes, progress, say_file, say_unless_quiet};
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
@@ -248,7 +248,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     if args.json {
         Ok(say_file(format_args!("{json}\n"))?)
     } else {
-        Ok(tell(report.table(&args.out))?)
+        Ok(say_unless_quiet(report.table(&args.out))?)
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::{note, notes, tell};
+use super::voice::{note, notes, say_unless_quiet};
 use crate::chip::{CellLibrary, FromFile, Probes, SensorConfig, macropixel};
 use crate::files::{InputError, OutputFile, ResultSet};
 use crate::liberty::{
@@ -34,8 +34,8 @@ struct Mapped<'c> {
 impl<'c> Mapped<'c> {
     /// # Errors
     /// A sensor of the built-in cells.
-    fn of(config: &'c SensorConfig, option: &str) -> Result<Self, InputError> {
-        let cells = CellLibrary::of(config)
+    fn new(config: &'c SensorConfig, option: &str) -> Result<Self, InputError> {
+        let cells = CellLibrary::from_config(config)
             .ok()
             .and_then(CellLibrary::from_file);
         let Some(cells) = cells else {
@@ -76,8 +76,8 @@ impl<'c> Mapped<'c> {
 /// Bad input and unwritable output.
 pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
-    Mapped::of(&config, "export sdc")?.write_sdc(&args.out)?;
-    tell(format_args!("{}\n", args.out.display()))?;
+    Mapped::new(&config, "export sdc")?.write_sdc(&args.out)?;
+    say_unless_quiet(format_args!("{}\n", args.out.display()))?;
     Ok(())
 }
 
@@ -86,7 +86,7 @@ pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
 /// # Errors
 /// A sensor of the built-in cells, and unwritable output.
 pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> {
-    let mapped = Mapped::of(config, "--mapped")?;
+    let mapped = Mapped::new(config, "--mapped")?;
     let Mapped {
         cells,
         netlist,
@@ -107,7 +107,7 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
     mapped.write_sdc(&file("mapped.sdc"))?;
     notes(set.commit(config)?);
     let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, 0);
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0} um2, leakage {:.3} nW\n",
         folder.display(),
         netlist.cells().len(),

@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::voice::{announce, notes, progress, say_json, tell};
+use super::voice::{announce, notes, progress, say_json, say_unless_quiet};
 use crate::chip::SensorConfig;
 use crate::engine::EngineError;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
@@ -91,7 +91,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
     );
     let rows = (!args.json).then(|| Rows::new(&methods));
     if let Some(rows) = &rows {
-        bar.suspend(|| tell(head(args, &settings, cells) + &rows.headings()))?;
+        bar.suspend(|| say_unless_quiet(head(args, &settings, cells) + &rows.headings()))?;
     }
     let mut summaries = Vec::new();
     let mut said = Ok(());
@@ -100,7 +100,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         Done::Method(points) => {
             let summary = summarise(points).expect("there is a wall");
             if let (Some(rows), Ok(())) = (&rows, &said) {
-                said = bar.suspend(|| tell(rows.row(&summary)));
+                said = bar.suspend(|| say_unless_quiet(rows.row(&summary)));
             }
             summaries.push(summary);
         }
@@ -133,7 +133,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         };
         say_json(&report)?;
     } else {
-        tell(foot(args, &settings))?;
+        say_unless_quiet(foot(args, &settings))?;
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::SceneArgs;
-use super::voice::{notes, progress, tell};
+use super::voice::{notes, progress, say_unless_quiet};
 use crate::chip::{CellLibrary, Sensor, SensorConfig};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::numerics::intervals::Estimate;
@@ -127,7 +127,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
         "seed": args.seed,
     });
     notes(results.commit(asked)?);
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "A target of reflectivity {} at {} m under {} klux, found with probability {} in {} frames a second, to {} m:\n\
          {} designs by theory, {} of them on the front and confirmed on cohort, in {took_s:.1} s; its corners are\n\n{}\n",
         goal.reflectivity,
@@ -140,9 +140,9 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
         found.front.len(),
         grid(&corners, &found, area),
     ))?;
-    tell(sentences(&problem, &found, &corners))?;
+    say_unless_quiet(sentences(&problem, &found, &corners))?;
     let (laser, design) = (1e2 * proposed.times_class_1, &proposed.design);
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows at {} frames a second.\n\
          One of its macropixels, simulated gate by gate, counts as the window engine in {cycles} laser cycles.\n\
          In {out}: designs.csv front.svg front.csv sensor.toml scene.toml {MANIFEST}\n\n  \
@@ -198,7 +198,7 @@ fn option_of(fault: &str) -> &'static str {
 
 /// In what areas are.
 fn area_unit(sensor: &SensorConfig) -> &'static str {
-    let library = CellLibrary::of(sensor).ok();
+    let library = CellLibrary::from_config(sensor).ok();
     match library.and_then(CellLibrary::from_file) {
         Some(_) => "um2",
         None => "transistors",

@@ -45,7 +45,7 @@ static DELAY_LINES: LazyLock<SensorConfig> = LazyLock::new(|| SensorConfig {
 /// A macropixel and its delays.
 static MACROPIXEL: LazyLock<(Netlist, Timing)> = LazyLock::new(|| {
     let netlist = Netlist::elaborate(&macropixel::circuit(&SENSOR));
-    let timing = Silicon::of(&SENSOR).timing(&netlist);
+    let timing = Silicon::new(&SENSOR).timing(&netlist);
     (netlist, timing)
 });
 
@@ -65,7 +65,7 @@ pub const READERS: &[(&str, Reader)] = &[
     }),
     ("curve", |path| {
         let (mut scene, csv) = (
-            Document::of("curve", Table::new()),
+            Document::from_table("curve", Table::new()),
             path.with_extension("csv"),
         );
         fs::copy(path, &csv).expect("a file of ours");
@@ -87,7 +87,9 @@ pub const READERS: &[(&str, Reader)] = &[
     ("block", |path| {
         let file = path.display().to_string().into();
         let table = Table::from_iter([("p_counter_block".to_owned(), file)]);
-        said(SensorConfig::read_document(&Document::of("block", table)))
+        said(SensorConfig::read_document(&Document::from_table(
+            "block", table,
+        )))
     }),
     ("captures", |path| said(tmf8820::read(path))),
     ("zones", |path| {
@@ -102,7 +104,7 @@ pub const READERS: &[(&str, Reader)] = &[
             let mut counts = Vec::new();
             write_npy(&mut counts, &[1, 1, 16], &[1u16; 16]).expect("it is in memory");
             fs::write(folder.join("histograms.npy"), counts).expect("a folder of ours");
-            Page::of(folder, folder, 1)
+            Page::read(folder, folder, 1)
         })
     }),
     ("counts", |path| said(read_counts(path, &[1, 1, 16]))),
@@ -150,14 +152,14 @@ fn beside<T, E: ToString>(
 /// Options as users write them, one a line: `guide=GUIDE`, `windows=POLICY`, `sensor.KEY=VALUE`, `scene.SECTION.KEY=VALUE`.
 fn read_options(path: &Path) -> Result<(), String> {
     let (mut sensor, mut scene) = (
-        Document::of("--set", Table::new()),
+        Document::from_table("--set", Table::new()),
         Scene::outdoor_document(),
     );
     for line in text(path)?.lines() {
         match line.split_once(['=', '.']) {
             Some(("guide", guide)) => said(options::parse_all(guide.split(' '), "--guide"))?,
             Some(("windows", policy)) => {
-                said(WindowPolicy::default().with(policy, "--windows"))?;
+                said(WindowPolicy::default().with_changes(policy, "--windows"))?;
             }
             Some(("sensor", assignment)) => said(sensor.assign(assignment, "--set"))?,
             Some(("scene", assignment)) => said(scene.assign(assignment, "--set"))?,

@@ -102,7 +102,7 @@ impl From<Checks> for Policy {
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let format = match &args.out {
         None => Format::Csv,
-        Some(path) => Format::of(path)?,
+        Some(path) => Format::from_path(path)?,
     };
     let file = |path: &Option<PathBuf>| Some(format!(" {}", path.as_ref()?.display()));
     for (option, given, what) in [
@@ -132,8 +132,8 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let silicon = args.silicon.read(&stimuli.sensor)?;
     // Delays of a file are the gates' to judge, and mismatched macropixels each their own (`gdtof timing --mismatch`).
     let timing = (args.sdf.is_none() && silicon.mismatch.is_none())
-        .then(|| TimingVerdict::of(&stimuli.sensor, &silicon, (0, 0)).report());
-    let silicon = (silicon != Silicon::of(&stimuli.sensor)).then_some(silicon);
+        .then(|| TimingVerdict::analyse(&stimuli.sensor, &silicon, (0, 0)).report());
+    let silicon = (silicon != Silicon::new(&stimuli.sensor)).then_some(silicon);
     if silicon.is_some() && args.sdf.is_some() {
         let message = "takes delays and limits from elsewhere; leave out either --sdf or process, voltage, temperature and mismatch";
         return Err(InputError::new("--sdf", message).into());
@@ -159,7 +159,7 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         timing,
         time_keeping: replayed.coverage,
     };
-    summary.tell(&stimuli.sensor);
+    summary.print_losses(&stimuli.sensor);
     let out = args.out.as_deref();
     write(&stimuli.sensor, &replayed.histograms, out, format)?;
     if args.json {
@@ -189,7 +189,7 @@ struct Summary {
 
 impl Summary {
     /// Says on standard error what the chip loses silently.
-    fn tell(&self, config: &SensorConfig) {
+    fn print_losses(&self, config: &SensorConfig) {
         if let Some(coverage) = &self.time_keeping {
             aside(table(coverage));
         }
@@ -326,7 +326,7 @@ fn record(
     let view = View::of_array(pixels.collect(), sensor, exposure, start);
     let format = args
         .wave_format
-        .map_or(WaveFormat::of(waves), WaveFormat::from);
+        .map_or(WaveFormat::from_path(waves), WaveFormat::from);
     waveform::record(simulation, waves, format, &view, observer)
 }
 

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use indicatif::DecimalBytes;
 
 use super::SensorArgs;
-use super::voice::{note, progress, tell};
+use super::voice::{note, progress, say_unless_quiet};
 use crate::ORIGIN;
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
@@ -97,7 +97,7 @@ pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
         Ok(())
     })?;
     progress.finish_and_clear();
-    tell(format_args!("{cells} cells in {}\n", args.out.display()))?;
+    say_unless_quiet(format_args!("{cells} cells in {}\n", args.out.display()))?;
     Ok(())
 }
 
@@ -110,7 +110,7 @@ fn write_library(
     options: SdfOptions,
 ) -> std::io::Result<usize> {
     let top = array::circuit(config);
-    let silicon = Silicon::of(config);
+    let silicon = Silicon::new(config);
     if silicon.cell_library.from_file().is_some() {
         let netlist = Netlist::elaborate(&top.renamed(design));
         let timing = silicon.timing(&netlist);
@@ -145,7 +145,7 @@ pub(super) fn annotated_timing(
 ) -> Result<Timing, InputError> {
     let text = read_text(path)?;
     let sdf = Sdf::parse(&path.display().to_string(), &text)?;
-    let mut timing = Silicon::of(config).timing(netlist);
+    let mut timing = Silicon::new(config).timing(netlist);
     let result = annotate(&mut timing, netlist, &sdf, config.corner)?;
     if result.is_empty() {
         return Err(InputError::new(

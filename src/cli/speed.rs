@@ -15,7 +15,7 @@ use clap::Args;
 use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 
-use super::voice::{progress, say_file, say_json, tell};
+use super::voice::{progress, say_file, say_json, say_unless_quiet};
 use crate::engine::{Cohort, CohortOptions, Cycle, Expose, Replay, Window};
 use crate::files::{InputError, read_text};
 use crate::photon::SpadEvent;
@@ -158,7 +158,7 @@ struct Spread {
 }
 
 impl Spread {
-    fn of(mut times_s: Vec<f64>) -> Self {
+    fn from_times(mut times_s: Vec<f64>) -> Self {
         times_s.sort_by(f64::total_cmp);
         Spread {
             least_s: times_s[0],
@@ -222,7 +222,7 @@ pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     if args.json {
         say_json(&figures)?;
     } else {
-        tell(table(&figures))?;
+        say_unless_quiet(table(&figures))?;
     }
     Ok(())
 }
@@ -351,7 +351,7 @@ fn timed<T, E: std::error::Error + Send + Sync + 'static>(
         processor_s.push(processor.elapsed().as_secs_f64());
         wall_s.push(wall.elapsed().as_secs_f64());
     }
-    Ok((Spread::of(wall_s), Spread::of(processor_s)))
+    Ok((Spread::from_times(wall_s), Spread::from_times(processor_s)))
 }
 
 /// Largest resident memory of this process, KiB, where /proc tells.

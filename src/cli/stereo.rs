@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
-use super::voice::{notes, say_json, tell};
+use super::voice::{notes, say_json, say_unless_quiet};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
 use crate::report::{Cell, DepthMap, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
@@ -186,7 +186,7 @@ pub(super) struct Errors {
 }
 
 impl Errors {
-    pub(super) fn of(map: &DisparityMap, truth: &[f32]) -> Self {
+    pub(super) fn new(map: &DisparityMap, truth: &[f32]) -> Self {
         let known = || {
             truth
                 .iter()
@@ -273,7 +273,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         matched: map.matched(),
         run_time_s: [times_s[0], times_s[times_s.len() / 2]],
         threads: rayon::current_num_threads(),
-        errors: truth.map(|truth| Errors::of(&map, &truth)),
+        errors: truth.map(|truth| Errors::new(&map, &truth)),
     };
     let set = ResultSet::begin(&args.out, "stereo")?;
     let shape = [map.height(), map.width()];
@@ -291,7 +291,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
     if args.json {
         say_json(&report)?
     } else {
-        tell(table(args, &report))?
+        say_unless_quiet(table(args, &report))?
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::voice::{counted, note, notes, progress, tell};
+use super::voice::{counted, note, notes, progress, say_unless_quiet};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
@@ -110,11 +110,11 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
             Ok(())
         })?;
         table.push("in", folder.display());
-        tell(table)?;
+        say_unless_quiet(table)?;
         written.complain(&study)?;
     } else {
-        tell(table)?;
-        tell(format_args!(
+        say_unless_quiet(table)?;
+        say_unless_quiet(format_args!(
             "\nThis is one of {} parts; when all are done: gdtof sweep merge {}\n",
             shard.of,
             folder.display()
@@ -152,7 +152,7 @@ fn run_merge(args: &MergeArgs) -> anyhow::Result<()> {
         table.push("points that are missing", written.missing);
     }
     table.push("in", out.display());
-    tell(table)?;
+    say_unless_quiet(table)?;
     Ok(written.complain(&study)?)
 }
 
@@ -208,7 +208,7 @@ fn write(
         .iter()
         .map(|plot| Drawing::new(plot, study, &columns, "--plot"));
     let mut drawings: Vec<Drawing<'_>> = drawings.collect::<Result<_, _>>()?;
-    let results = Results::of(study, folders)?;
+    let results = Results::read(study, folders)?;
     let (mut fault, mut has_result) = (None, false);
     let missing = results.write(set.staging(), |cells| {
         match cells.last() {
@@ -216,7 +216,9 @@ fn write(
             Some(Cell::Word(why)) => drop(fault.get_or_insert_with(|| why.clone())),
             _ => has_result = true,
         }
-        drawings.iter_mut().for_each(|drawing| drawing.see(cells));
+        drawings
+            .iter_mut()
+            .for_each(|drawing| drawing.add_row(cells));
     });
     let missing = missing.map_err(plain)?;
     check(missing)?;

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::SensorArgs;
 use super::asked::WaveFormatOption;
-use super::voice::{complain, note, notes, progress, say_json, tell};
+use super::voice::{complain, note, notes, progress, say_json, say_unless_quiet};
 use crate::chip::SensorConfig;
 use crate::files::{InputError, ResultSet, clean_up_when_interrupted, instead_of};
 use crate::report::{Checks, Grid};
@@ -104,13 +104,13 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
                 continue;
             };
             if args.verbose || !result.passed {
-                tell(format_args!("{}\n{}\n", entry.name, result.checks))?;
+                say_unless_quiet(format_args!("{}\n{}\n", entry.name, result.checks))?;
             }
         }
-        tell(table(&entries))?;
+        say_unless_quiet(table(&entries))?;
         if let Some(first) = results().next() {
             let view = first.waveform.with_extension("gtkw");
-            tell(format_args!(
+            say_unless_quiet(format_args!(
                 "waveforms: gtkwave {}, for example\n",
                 view.display()
             ))?;
@@ -257,7 +257,7 @@ pub fn testbench(name: &'static str) -> ExitCode {
             let view = result.waveform.with_extension("gtkw");
             let text = format!("{}waveform: gtkwave {}\n", result.checks, view.display());
             // A reader that has gone away changes no verdict.
-            let _ = tell(text);
+            let _ = say_unless_quiet(text);
             if result.passed {
                 ExitCode::SUCCESS
             } else {

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`complain`] | standard error | yes |
 //! | [`say_json`], [`say_file`]: what a program or a file takes | standard output | yes |
-//! | [`tell`]: tables and sentences about what was done | standard output | no |
+//! | [`say_unless_quiet`]: tables and sentences about what was done | standard output | no |
 //! | [`note`], [`announce`], [`aside`] | standard error | no |
 //! | [`progress`], [`busy`] | standard error, if it is a terminal | no |
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -64,7 +64,7 @@ pub(super) fn say_json(data: &(impl Serialize + ?Sized)) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// Those of standard output.
-pub(super) fn tell(text: impl Display) -> std::io::Result<()> {
+pub(super) fn say_unless_quiet(text: impl Display) -> std::io::Result<()> {
     if is_quiet() {
         return Ok(());
     }

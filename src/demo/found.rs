@@ -35,7 +35,7 @@ const ENOUGH: f64 = 0.5;
 
 impl Found {
     /// These macropixels, with bins of `bin_m`.
-    pub(crate) fn of<'p>(pixels: impl Iterator<Item = &'p PixelDepth>, bin_m: f64) -> Self {
+    pub(crate) fn summarise<'p>(pixels: impl Iterator<Item = &'p PixelDepth>, bin_m: f64) -> Self {
         let mut found = Found::default();
         let (mut truths, mut depths, mut guides) = (Vec::new(), Vec::new(), Vec::new());
         for pixel in pixels {
@@ -129,7 +129,7 @@ mod tests {
         let right = pixel(Some(40.1), true);
         let wrong = pixel(Some(42.0), true);
         let missed = pixel(None, false);
-        let found = Found::of([&right, &right, &wrong, &missed].into_iter(), 0.39);
+        let found = Found::summarise([&right, &right, &wrong, &missed].into_iter(), 0.39);
         assert!(found.is_found());
         assert_eq!((found.seen_by, found.right, found.wrong), (4, 2, 1));
         assert_eq!(
@@ -143,8 +143,11 @@ mod tests {
             text,
             "found at 40.0 m: 2 of 4 right to a bin (RMS 0.100 m), 1 wrong, 1 target outside window"
         );
-        let lost = Found::of([&right, &missed, &missed].into_iter(), 0.39);
+        let lost = Found::summarise([&right, &missed, &missed].into_iter(), 0.39);
         assert!(!lost.is_found());
-        assert_eq!(Found::of([].into_iter(), 0.39).to_string(), "out of view");
+        assert_eq!(
+            Found::summarise([].into_iter(), 0.39).to_string(),
+            "out of view"
+        );
     }
 }

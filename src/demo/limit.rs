@@ -104,7 +104,7 @@ fn limit(
         energy,
         disparity_px,
         period_s,
-        found: Found::of(pixels.iter(), bin_m),
+        found: Found::summarise(pixels.iter(), bin_m),
     })
 }
 

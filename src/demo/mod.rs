@@ -49,11 +49,11 @@ impl Demonstrator {
             ..Sweep::default()
         };
         let calibrated = calibrate(&sensor, STOP_PERIODS, &sweep, swept)?;
-        Ok(Self::of(calibrated.profile))
+        Ok(Self::new(calibrated.profile))
     }
 
     /// The chip that a calibration is of, perhaps with fewer rows.
-    pub(crate) fn of(calibration: BinProfile) -> Self {
+    pub(crate) fn new(calibration: BinProfile) -> Self {
         Demonstrator {
             exposure: Exposure::new(&calibration.sensor, STOP_PERIODS, LASER_CYCLES),
             sensor: Sensor::from(&calibration.sensor),

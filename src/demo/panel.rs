@@ -107,7 +107,7 @@ impl Panel<'_> {
     fn camera(&self, rows: u32, cols: u32) -> Vec<[u8; 3]> {
         let (wide, high) = CAMERA_RAYS;
         let camera = self.world.lidar_camera(rows, cols);
-        let stage = Stage::of(self.world);
+        let stage = Stage::new(self.world);
         let sun = DVec3::new(-0.3, -0.6, -0.74);
         let grey = |row: u32, col: u32| {
             let at = (

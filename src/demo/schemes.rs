@@ -103,7 +103,7 @@ pub(crate) fn compare(
         scheme,
         bins,
         exposures,
-        found: Found::of(depths.iter(), 0.39),
+        found: Found::summarise(depths.iter(), 0.39),
     };
     // Windows overlap: a full histogram has the bins of one step of each, and the rest of the last.
     let step_bins = 12.5 / 2.6;

@@ -32,7 +32,7 @@ impl Target {
     /// What became of it in a frame.
     pub(crate) fn found(&self, frame: &DriveFrame) -> Found {
         let pixels = self.pixels(&frame.truth).map(|pixel| &frame.pixels[pixel]);
-        Found::of(pixels, frame.bin_m)
+        Found::summarise(pixels, frame.bin_m)
     }
 
     /// The macropixels that see it.
@@ -152,7 +152,7 @@ impl Show {
         demonstrator: &Demonstrator,
         frame: &DriveFrame,
     ) -> Result<Vec<Outcome>, FrameError> {
-        let world = self.settings.frame.scene.at(frame.times.middle_s());
+        let world = self.settings.frame.scene.snapshot(frame.times.middle_s());
         let pixels: Vec<usize> = self.targets[0].pixels(&frame.truth).collect();
         let every = pixels.len().div_ceil(COMPARED).max(1);
         let pixels: Vec<usize> = pixels.into_iter().step_by(every).collect();
@@ -165,7 +165,7 @@ impl Show {
     }
 
     fn picture(&self, frame: &DriveFrame) -> Picture {
-        let world = self.settings.frame.scene.at(frame.times.middle_s());
+        let world = self.settings.frame.scene.snapshot(frame.times.middle_s());
         let middles = self.targets.iter();
         let samples: Vec<(&str, (usize, usize))> = middles
             .filter_map(|target| Some((target.name, target.middle(&frame.truth)?)))

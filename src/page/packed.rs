@@ -222,7 +222,7 @@ fn arrays(
         let start = known.start.map_or(-1, |start| start as i16);
         bytes.extend(start.to_le_bytes());
     }
-    let scene = scene.at(frame.time_s);
+    let scene = scene.snapshot(frame.time_s);
     for object in objects(&scene, sensor) {
         bytes.extend(object.to_le_bytes());
     }
@@ -238,7 +238,7 @@ fn arrays(
 fn objects(scene: &Scene, sensor: &SensorConfig) -> Vec<u16> {
     let (rows, cols) = (sensor.rows, sensor.cols);
     let camera = scene.lidar_camera(rows as u32, cols as u32);
-    let stage = Stage::of(scene);
+    let stage = Stage::new(scene);
     let pixels = (0..rows * cols).into_par_iter();
     let seen = pixels.map(|pixel| {
         let at = ((pixel % cols) as f64 + 0.5, (pixel / cols) as f64 + 0.5);

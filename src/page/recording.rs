@@ -85,7 +85,7 @@ fn of_frame(folder: &Path, path: &Path) -> Result<Recording, InputError> {
     let shape = [sensor.rows, sensor.cols, sensor.bins];
     let counts = read_counts(&folder.join("histograms.npy"), &shape)?;
     let known = taken.pixels.iter().enumerate();
-    let known = known.map(|(pixel, depth)| Known::of(pixel, depth));
+    let known = known.map(|(pixel, depth)| Known::new(pixel, depth));
     let exposure = &taken.settings.exposure;
     let frame = Recorded {
         number: 0,

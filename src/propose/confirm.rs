@@ -89,7 +89,7 @@ fn kind(point: &Point) -> (usize, u64, u8, u64) {
 /// The same design with `times` the laser cycles, or a little more; nothing if these cost more than may be.
 fn longer(problem: &Problem, point: &Point, times: f64) -> Option<Point> {
     let least = (f64::from(point.design.laser_cycles) * times.max(1.02)).ceil() as u32;
-    let candidate = problem.judge_from(&Choice::of(point, 1.0, false), least);
+    let candidate = problem.judge_from(&Choice::from_point(point, 1.0, false), least);
     let candidate = candidate.ok()?;
     candidate.limit().is_none().then_some(candidate.point)
 }

@@ -174,7 +174,7 @@ impl Problem {
                 "has periods of {period}, in which photons of a SPAD cancel, as its dead time is {dead_time}"
             ));
         }
-        let verdict = TimingVerdict::of(config, &Silicon::of(config), (0, 0));
+        let verdict = TimingVerdict::analyse(config, &Silicon::new(config), (0, 0));
         if verdict.is_met() {
             Ok(())
         } else {
@@ -190,7 +190,7 @@ impl Problem {
             return area;
         }
         let circuit = macropixel::circuit(config);
-        let library = CellLibrary::of(config).ok();
+        let library = CellLibrary::from_config(config).ok();
         let area = match library.and_then(CellLibrary::from_file) {
             None => circuit.transistors() as f64,
             Some(library) => {
@@ -322,7 +322,7 @@ impl Problem {
                     pulses,
                     frame_s: (1.0 / frames_hz).max(pulses / pulse_hz),
                 };
-                let emission = self.emission.with(window.pulse_energy_uj, train);
+                let emission = self.emission.scaled(window.pulse_energy_uj, train);
                 let judged = emission.beside_class_1().expect("a judged wavelength");
                 (judged.times_class_1, judged.rule)
             };
@@ -367,7 +367,7 @@ impl Problem {
     ///
     /// # Errors
     /// What makes it impossible whatever the laser cycles.
-    pub fn judge(&self, choice: &Choice) -> Result<Candidate, Limit> {
+    pub fn evaluate(&self, choice: &Choice) -> Result<Candidate, Limit> {
         self.judge_from(choice, 1)
     }
 

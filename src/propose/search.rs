@@ -90,7 +90,7 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn take(&mut self, candidate: Candidate) {
+    fn add(&mut self, candidate: Candidate) {
         self.tried += 1;
         if candidate.limit().is_none() {
             return self.points.push(candidate.point);
@@ -126,7 +126,7 @@ impl Gathered {
         let tried = self.tried + other.tried;
         self.points.extend(other.points);
         let nearest = other.nearest.into_iter().flatten();
-        nearest.for_each(|candidate| self.take(candidate));
+        nearest.for_each(|candidate| self.add(candidate));
         other
             .limit
             .into_iter()
@@ -192,7 +192,7 @@ fn of_clock(
                     guide_sigma_m,
                     ..choice
                 };
-                let take = |candidate| gathered.take(candidate);
+                let take = |candidate| gathered.add(candidate);
                 match problem.designs(&choice, &seen, (least, most), &RATES_HZ, take) {
                     Ok(cycles) => (least, found) = (cycles, true),
                     Err(limit) => {
@@ -236,7 +236,7 @@ fn solved(problem: &Problem, own: bool, points: &[Point]) -> Vec<Point> {
         let with = |times: f64| -> Option<Point> {
             // More light takes fewer laser cycles, by the square at most.
             let least = f64::from(point.design.laser_cycles) / (2.0 * times * times);
-            let choice = Choice::of(point, times, own);
+            let choice = Choice::from_point(point, times, own);
             let candidate = problem.judge_from(&choice, 1 + least as u32).ok()?;
             candidate.limit().is_none().then_some(candidate.point)
         };

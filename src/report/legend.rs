@@ -94,7 +94,7 @@ pub(super) struct Legend<'s> {
 
 impl<'s> Legend<'s> {
     /// Lays out all series that have a name.
-    pub(super) fn of(series: &'s [Series]) -> Self {
+    pub(super) fn new(series: &'s [Series]) -> Self {
         let (mut x, mut row) = (LEFT, 0);
         let named = series.iter().zip(looks(series));
         let entries = named
@@ -204,13 +204,13 @@ mod tests {
         let all: Vec<Series> = (0..14)
             .map(|i| series(&"name ".repeat(1 + i % 5), Style::Line))
             .collect();
-        let legend = Legend::of(&all);
+        let legend = Legend::new(&all);
         assert_eq!(legend.entries.len(), 14);
         for pair in legend.entries.windows(2) {
             let ((a, _, (x, y)), (_, _, (next_x, next_y))) = (pair[0], pair[1]);
             let end = x + SAMPLE + (LETTER * a.name.chars().count() as f64) as i32;
             assert!(end < 900 && (next_y > y || next_x >= end));
         }
-        assert_eq!(Legend::of(&[]).height(), 0);
+        assert_eq!(Legend::new(&[]).height(), 0);
     }
 }

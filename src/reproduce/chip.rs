@@ -34,7 +34,7 @@ struct Edges {
 }
 
 impl Edges {
-    fn of(start: u16) -> Self {
+    fn simulate(start: u16) -> Self {
         let config = SensorConfig {
             rows: 1,
             cols: 1,
@@ -93,10 +93,10 @@ impl Edges {
 pub(super) fn ripple_rows() -> Vec<Row> {
     let claim = claim(2);
     let config = SensorConfig::default();
-    let timing = MacropixelTiming::of(&config, &NOMINAL, Limits::Ignored, (0, 0));
+    let timing = MacropixelTiming::analyse(&config, &NOMINAL, Limits::Ignored, (0, 0));
     let starts = [0, 1, 5, 21, 31, 42, 52, 60];
     let simulated = starts
-        .map(|start| Edges::of(start).ripple_ns())
+        .map(|start| Edges::simulate(start).ripple_ns())
         .into_iter()
         .fold(f64::NEG_INFINITY, f64::max);
     let slow = Time::from_ns(20);
@@ -141,7 +141,7 @@ pub(super) fn figure_56() -> Chart {
 /// Claim 3: Fig. 54.
 pub(super) fn fig_54_rows() -> Vec<Row> {
     let claim = claim(3);
-    let edges = Edges::of(5);
+    let edges = Edges::simulate(5);
     let after_stop = edges
         .counter_clk
         .first()
@@ -158,7 +158,7 @@ pub(super) fn fig_48_rows() -> Vec<Row> {
     let claim = claim(4);
     let period = SensorConfig::default().clock().period();
     let [first, second] = [52, 49].map(|start| {
-        let edges = Edges::of(start);
+        let edges = Edges::simulate(start);
         let rise = edges.local_stop.first().copied();
         rise.map_or(f64::NAN, |t| (t - edges.stop).as_ns() / period.as_ns())
     });
@@ -203,7 +203,7 @@ fn fig_48_bins() -> Histograms {
 pub(super) fn load_rows() -> Vec<Row> {
     let claim = claim(5);
     let config = SensorConfig::default();
-    let netlists = PinNetlists::of(&config);
+    let netlists = PinNetlists::new(&config);
     let counts = sparse_counts(&config);
     let all = PIN_CLOCKS_MHZ.map(|mhz| netlists.run_at(mhz, &config, &counts));
     let worst = all
@@ -211,7 +211,7 @@ pub(super) fn load_rows() -> Vec<Row> {
         .map(|times| times.load.as_s() / times.read.as_s());
     let worst = worst.fold(f64::NEG_INFINITY, f64::max);
     let fewest_right = |pick: fn(&PinTimes) -> usize| all.iter().map(pick).min().unwrap_or(0);
-    let pins = ReadoutOrder::of(&config).pins() as f64;
+    let pins = ReadoutOrder::new(&config).pins() as f64;
     let at_200 = &all[3];
     debug_assert_eq!(PIN_CLOCKS_MHZ[3], 200);
 

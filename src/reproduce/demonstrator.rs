@@ -37,7 +37,7 @@ const BRIGHTER: f64 = 0.25;
 
 /// The demonstrator, of four rows.
 fn chain() -> Demonstrator {
-    Demonstrator::of(delay_line::calibrated().clone())
+    Demonstrator::new(delay_line::calibrated().clone())
 }
 
 /// Length of its exposure, s.
@@ -106,7 +106,7 @@ const SWEEPS: u64 = 4;
 /// σ of the sweep's last point, m.
 fn sigma_m(otherwise: Otherwise) -> f64 {
     let demonstrator = if otherwise.alike {
-        Demonstrator::of(delay_line::calibrated_alike())
+        Demonstrator::new(delay_line::calibrated_alike())
     } else {
         chain()
     };

@@ -61,20 +61,20 @@ fn column(file: &Path) -> Result<(String, [String; FIGURES.len()]), InputError> 
         liberty: file.to_owned(),
         ..SensorConfig::default()
     };
-    let library =
-        CellLibrary::of(&config).map_err(|(_, fault)| InputError::new("--liberty", fault))?;
-    let silicon = Silicon::of(&config);
-    let timing = MacropixelTiming::of(&config, &silicon, Limits::Kept, (0, 0));
+    let library = CellLibrary::from_config(&config)
+        .map_err(|(_, fault)| InputError::new("--liberty", fault))?;
+    let silicon = Silicon::new(&config);
+    let timing = MacropixelTiming::analyse(&config, &silicon, Limits::Kept, (0, 0));
     let below = timing.forbidden(0).0 - Time::from_ps(2);
     let any_phase = shortest_period(below, |p| phases(p).any(|phase| timing.works(p, phase)));
-    let load = LoadTiming::of(&config, &silicon, Limits::Kept).period();
+    let load = LoadTiming::analyse(&config, &silicon, Limits::Kept).period();
     let slow = SensorConfig {
         clk_hz: ENERGY_RUN.0,
         ..config.clone()
     };
     let exposure = Exposure::new(&slow, ENERGY_RUN.1, 2);
     let start = slow.largest_start() / 2 + 1;
-    let power = MacropixelPower::of(&slow, &exposure, start, &[], &Capacitances::default());
+    let power = MacropixelPower::simulate(&slow, &exposure, start, &[], &Capacitances::default());
     let ripple = timing.ripple.delay().as_ns();
     let reset_ps = (timing.reset_width() - timing.reset_need()).as_ns() * 1e3;
     let ns = |time: Option<Time>| time.map_or("none".to_owned(), |t| format!("{:.2}", t.as_ns()));

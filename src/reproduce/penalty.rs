@@ -90,7 +90,7 @@ pub(super) fn long_range_rows() -> Vec<Row> {
     let full = system.full(200.0);
     let (zooming, sliding) = (system.zooming(200.0), system.sliding(200.0, 0));
     let chip = one_hit(system).zooming(200.0);
-    let on_chip = long_range_on_chip().at(200.0);
+    let on_chip = long_range_on_chip().result(200.0);
     let measured = on_chip.penalty_of_sliding();
     let mut rows = vec![
         claim
@@ -215,8 +215,8 @@ pub(super) fn demonstrator_rows() -> Vec<Row> {
     let coarse_m = f64::from(system.bins) * system.window_m;
     let coarse_ns = 2e9 * coarse_m / SPEED_OF_LIGHT_M_PER_S;
     let (at_75, at_74) = (
-        demonstrator_on_chip().at(75.0),
-        demonstrator_on_chip().at(74.0),
+        demonstrator_on_chip().result(75.0),
+        demonstrator_on_chip().result(74.0),
     );
     let sliding_75 = at_75.penalty_of_sliding();
     let sliding_74 = at_74.penalty_of_sliding();

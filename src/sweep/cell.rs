@@ -74,7 +74,7 @@ impl Cell {
     }
 
     /// A setting's value in a column that holds `holds`.
-    pub(super) fn of(value: &Value, holds: Holds) -> Self {
+    pub(super) fn from_value(value: &Value, holds: Holds) -> Self {
         match (value, holds) {
             (Value::Integer(n), Holds::Number) => Cell::Number(*n as f64),
             (Value::Integer(n), Holds::Whole) => Cell::Whole(*n),

@@ -157,7 +157,7 @@ impl<'a> Drawing<'a> {
     }
 
     /// Sees a row.
-    pub(crate) fn see(&mut self, cells: &[Cell]) {
+    pub(crate) fn add_row(&mut self, cells: &[Cell]) {
         let [x, y] = self.columns;
         let (Some(x), Some(y)) = (cells[x].number(), cells[y].number()) else {
             return;
@@ -219,7 +219,7 @@ impl<'a> Drawing<'a> {
             let is_cloud = at.len() == 1 || (at.len() > 50 && rows < 2 * at.len() as u64);
             let style = if is_cloud { Style::Points } else { Style::Line };
             let means = at.iter().map(|(x, seen)| (x.0, seen.mean()));
-            chart = chart.with(label, style, means);
+            chart = chart.with_series(label, style, means);
             if rows > at.len() as u64 {
                 let ends = at
                     .iter()
@@ -250,7 +250,7 @@ mod tests {
             let mut cells = vec![Cell::Empty; columns.len()];
             (cells[1], cells[2], cells[p_miss]) =
                 (Cell::Number(x), Cell::Number(0.5), Cell::Number(y));
-            drawing.see(&cells);
+            drawing.add_row(&cells);
         }
         let chart = drawing.chart(&study, "--plot").unwrap();
         let series: Vec<_> = chart

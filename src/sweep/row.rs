@@ -17,7 +17,7 @@ pub(super) struct Key(u128);
 
 impl Key {
     /// Of a point whose `content` says all of it, with results in `columns`.
-    pub(super) fn of(kind: &str, columns: &[Column], content: &str) -> Self {
+    pub(super) fn from_content(kind: &str, columns: &[Column], content: &str) -> Self {
         let mut hash = Sha256::new();
         for part in [
             "gdtof",
@@ -116,7 +116,7 @@ impl Index {
     ///
     /// # Errors
     /// When one cannot be read.
-    pub(super) fn of(paths: Vec<PathBuf>, columns: &[Column]) -> Result<Self, InputError> {
+    pub(super) fn read(paths: Vec<PathBuf>, columns: &[Column]) -> Result<Self, InputError> {
         let mut index = Index::default();
         for (number, path) in paths.iter().enumerate() {
             let places = &mut index.places;
@@ -178,7 +178,7 @@ impl Rows<'_> {
             return Ok(None);
         };
         let reader = &mut self.readers[(place >> OFFSET_BITS) as usize];
-        let text = reader.at(place & ((1 << OFFSET_BITS) - 1))?;
+        let text = reader.read_line_at(place & ((1 << OFFSET_BITS) - 1))?;
         Ok(text.and_then(|text| Row::parse(text, key, self.columns)))
     }
 }
@@ -230,7 +230,7 @@ mod tests {
                 ],
             },
         };
-        let key = |i: usize| Key::of("x", &columns, &i.to_string());
+        let key = |i: usize| Key::from_content("x", &columns, &i.to_string());
         for name in ["journal.log", "journal-2-of-2.log", "notes.txt"] {
             let mut journal = Journal::open(&dir.path().join(name)).unwrap().unwrap();
             let own = (0..300).filter(|i| (i % 3 == 0) == (name == "journal.log"));
@@ -238,20 +238,20 @@ mod tests {
                 journal.append(&row(i).line(key(i))).unwrap();
             }
         }
-        let index = Index::of(journals_in(dir.path()), &columns).unwrap();
+        let index = Index::read(journals_in(dir.path()), &columns).unwrap();
         assert_eq!(index.places.len(), 300);
         let mut rows = index.rows(&columns).unwrap();
         for i in (0..300).rev() {
             assert_eq!(rows.get(key(i)).unwrap(), Some(row(i)));
         }
         assert_eq!(rows.get(key(300)).unwrap(), None);
-        assert_ne!(Key::of("x", &columns[..1], "7"), key(7));
+        assert_ne!(Key::from_content("x", &columns[..1], "7"), key(7));
     }
 
     #[test]
     fn a_row_of_no_use_is_not_there() {
         let columns = [Column::new("a", "", Holds::Whole)];
-        let key = |i: usize| Key::of("x", &columns, &i.to_string());
+        let key = |i: usize| Key::from_content("x", &columns, &i.to_string());
         let unusable = [
             "nonsense",
             "[]",
@@ -275,7 +275,7 @@ mod tests {
             cells: vec![Cell::Whole(7)],
         };
         journal.append(&row.line(key(0))).unwrap();
-        let index = Index::of(journals_in(dir.path()), &columns).unwrap();
+        let index = Index::read(journals_in(dir.path()), &columns).unwrap();
         assert_eq!((index.places.len(), index.spoilt), (1, 0));
         assert_eq!(
             index.rows(&columns).unwrap().get(key(0)).unwrap(),

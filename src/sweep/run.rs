@@ -99,7 +99,7 @@ pub fn run<A: Answer>(
         return Err(InputError::new(path.display(), message).into());
     };
     keep(study, folder)?;
-    let there = Index::of(journals_in(folder), &Subject::columns(study.kind))?;
+    let there = Index::read(journals_in(folder), &Subject::columns(study.kind))?;
     let points = shard.share(study.len());
     let workers = (rayon::current_num_threads() as u64).min(points).max(1);
     // A theoretical point takes less than a write.
@@ -179,7 +179,7 @@ impl Work<'_> {
                 return;
             }
             let end = (begin + self.batch).min(self.points);
-            let taken = self.take(begin..end, &mut scratch);
+            let taken = self.run_batch(begin..end, &mut scratch);
             let stops = done(end - begin).stops();
             if let Err(error) = taken.and(if stops {
                 Err(SweepError::Stopped)
@@ -195,7 +195,11 @@ impl Work<'_> {
         }
     }
 
-    fn take(&self, batch: std::ops::Range<u64>, scratch: &mut Scratch) -> Result<(), SweepError> {
+    fn run_batch(
+        &self,
+        batch: std::ops::Range<u64>,
+        scratch: &mut Scratch,
+    ) -> Result<(), SweepError> {
         let mut lines = String::new();
         let mut counts = [0; 3];
         for at in batch {
@@ -212,7 +216,7 @@ impl Work<'_> {
                 continue;
             }
             let key = ready.key;
-            let row = self.subject.take(ready, scratch)?;
+            let row = self.subject.compute_row(ready, scratch)?;
             counts[1] += 1;
             counts[2] += u64::from(row.error.is_some());
             lines += &row.line(key);

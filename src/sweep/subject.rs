@@ -126,7 +126,7 @@ impl<'a> Subject<'a> {
                 Kind::Frame => "frame",
                 Kind::Theory => "theory",
             };
-            Key::of(kind, &self.columns, content)
+            Key::from_content(kind, &self.columns, content)
         };
         if self.study.kind == Kind::Theory {
             let asked = of_theory.try_into().expect("every value has been checked");
@@ -242,7 +242,11 @@ impl<'a> Subject<'a> {
     ///
     /// # Errors
     /// Faults of the program; a frame that an engine refuses is a row that says so.
-    pub(super) fn take(&self, ready: Ready, scratch: &mut Scratch) -> Result<Row, SweepError> {
+    pub(super) fn compute_row(
+        &self,
+        ready: Ready,
+        scratch: &mut Scratch,
+    ) -> Result<Row, SweepError> {
         match ready.task {
             Task::Theory(wall) => Ok(Row {
                 run_time_s: 0.0,
@@ -482,7 +486,7 @@ mod tests {
         let subject = Subject::new(&study);
         let mut scratch = Scratch::default();
         let ready = subject.ready(&study.point(0), &mut scratch).unwrap();
-        let row = subject.take(ready, &mut scratch).unwrap();
+        let row = subject.compute_row(ready, &mut scratch).unwrap();
         assert_eq!(row.error, None);
         let of = |name: &str| {
             let at = frame_columns().iter().position(|c| c.name == name).unwrap();

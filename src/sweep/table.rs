@@ -46,12 +46,12 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// When one cannot be read.
-    pub fn of(study: &'a Study, folders: &[PathBuf]) -> Result<Self, InputError> {
+    pub fn read(study: &'a Study, folders: &[PathBuf]) -> Result<Self, InputError> {
         let journals = folders
             .iter()
             .flat_map(|folder| journals_in(folder))
             .collect();
-        let index = Index::of(journals, &Subject::columns(study.kind))?;
+        let index = Index::read(journals, &Subject::columns(study.kind))?;
         Ok(Results { study, index })
     }
 

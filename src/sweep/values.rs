@@ -28,7 +28,7 @@ pub(super) struct Span {
 
 impl Span {
     /// The value at a share of the way, 0 to 1.
-    fn at(&self, share: f64) -> Value {
+    fn value(&self, share: f64) -> Value {
         let Span { from, to, .. } = *self;
         // The ends are what was written, to the bit.
         let number = match share {
@@ -69,8 +69,8 @@ impl Varied {
         match &self.values {
             Values::List(list) => list[index as usize].clone(),
             Values::Range(span) => match span.steps.map(u64::from) {
-                None | Some(1) => span.at(0.0),
-                Some(steps) => span.at(index as f64 / (steps - 1) as f64),
+                None | Some(1) => span.value(0.0),
+                Some(steps) => span.value(index as f64 / (steps - 1) as f64),
             },
         }
     }
@@ -82,12 +82,12 @@ impl Varied {
                 let index = (share * list.len() as f64) as usize;
                 list[index.min(list.len() - 1)].clone()
             }
-            Values::Range(span) => span.at(share),
+            Values::Range(span) => span.value(share),
         }
     }
 
     pub(super) fn cell(&self, value: &Value) -> Cell {
-        Cell::of(value, self.column.holds)
+        Cell::from_value(value, self.column.holds)
     }
 }
 

@@ -36,7 +36,7 @@ use rayon::prelude::*;
 
 use self::reuse::{Last, Same, Spent};
 use super::error::FrameError;
-use super::frame::go_on;
+use super::frame::check_not_stopped;
 use super::pixel::PixelDepth;
 use super::result::PhaseTimes;
 use super::stopwatch::Stopwatch;
@@ -104,11 +104,11 @@ impl Drive<'_> {
         let light = self.light(&plan, before, &mut spent);
 
         let mut clock = Stopwatch::new();
-        let same = Same::of(
+        let same = Same::new(
             before.filter(|_| self.settings.noise == Noise::Still),
             &light,
         );
-        go_on(exposed(same.number()))?;
+        check_not_stopped(exposed(same.number()))?;
         spent.reused.load = before.is_some_and(|last| last.starts == plan.starts);
         spent.reused.macropixels = same.number();
         let (histograms, work) =

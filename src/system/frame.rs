@@ -74,7 +74,7 @@ pub fn take_frame_by<A: Answer>(
     let input = GuideInput::still(scene, rows, cols, *seed);
     let guide = settings.guide.estimate(&input)?;
     let guide_s = clock.lap();
-    go_on(exposed(0))?;
+    check_not_stopped(exposed(0))?;
     let mut pointing = Pointing::new(policy, sensor, exposure, calibration.as_ref());
     let wanted = pointing.windows(&guide, &[]);
     let windows_s = clock.lap();
@@ -94,7 +94,7 @@ pub(crate) fn take_shared_frame<A: Answer>(
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let mut clock = Stopwatch::new();
-    let look = shared.look(settings);
+    let look = shared.shared_look(settings);
     let Some(guided) = look.windows(settings, policy)? else {
         return take_frame_by(settings, policy, |_| Vec::new(), exposed);
     };
@@ -106,7 +106,7 @@ pub(crate) fn take_shared_frame<A: Answer>(
         wanted,
         shared: Some((shared, &look)),
     };
-    let mut frame = plan.take(|_| Vec::new(), exposed)?;
+    let mut frame = plan.expose(|_| Vec::new(), exposed)?;
     frame.times.guide_s = guide_s;
     Ok(frame)
 }
@@ -136,7 +136,7 @@ pub fn take_guided_frame<A: Answer>(
         wanted,
         shared: None,
     };
-    plan.take(probes, exposed)
+    plan.expose(probes, exposed)
 }
 
 /// A frame whose windows are chosen.
@@ -183,7 +183,7 @@ impl Light {
 }
 
 impl Plan<'_> {
-    fn take<A: Answer>(
+    fn expose<A: Answer>(
         &self,
         probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
         exposed: impl Fn(usize) -> A + Sync,
@@ -213,7 +213,7 @@ impl Plan<'_> {
         let load_time = load_time?;
         let (counted, ranged) = measured?;
         let probed = probed?;
-        self.judge(&counted, &probed)?;
+        self.compare_probes(&counted, &probed)?;
 
         Ok(Frame {
             rows: sensor.rows,
@@ -370,7 +370,7 @@ impl Plan<'_> {
     ) -> Result<Vec<AtGates>, FrameError> {
         let s = self.settings;
         let run = |probe| {
-            go_on(done(0))?;
+            check_not_stopped(done(0))?;
             AtGates::run(s, &light.stream, &light.pixels, probe)
         };
         probes.par_iter().map(run).collect()
@@ -381,7 +381,7 @@ impl Plan<'_> {
     ///
     /// # Errors
     /// The first disagreement.
-    fn judge(&self, counted: &Counted, probed: &[AtGates]) -> Result<(), FrameError> {
+    fn compare_probes(&self, counted: &Counted, probed: &[AtGates]) -> Result<(), FrameError> {
         let s = self.settings;
         let has_tolerance = counted.kept.is_some();
         let engine = s.engine.of_probes(has_tolerance);
@@ -426,7 +426,7 @@ impl Plan<'_> {
 ///
 /// # Errors
 /// When it is not.
-pub(super) fn go_on(answer: impl Answer) -> Result<(), EngineError> {
+pub(super) fn check_not_stopped(answer: impl Answer) -> Result<(), EngineError> {
     if answer.stops() {
         Err(EngineError::Stopped)
     } else {

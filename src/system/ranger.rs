@@ -28,7 +28,7 @@ pub(crate) struct Known {
 
 impl Known {
     /// What was known of macropixel number `pixel` when its depth was found.
-    pub(crate) fn of(pixel: usize, depth: &PixelDepth) -> Self {
+    pub(crate) fn new(pixel: usize, depth: &PixelDepth) -> Self {
         Known {
             pixel,
             start: depth.start,
@@ -39,7 +39,7 @@ impl Known {
 
     /// Whether this was known of a macropixel when its depth was found.
     pub(crate) fn is_of(&self, depth: &PixelDepth) -> bool {
-        *self == Known::of(self.pixel, depth)
+        *self == Known::new(self.pixel, depth)
     }
 }
 

@@ -46,7 +46,7 @@ impl TakenFrame {
         } = &self.settings;
         let ranger = Ranger::new(sensor, exposure, scene, options, calibration)?;
         let depth = |pixel: usize, counts: &[u16]| {
-            ranger.depth(&Known::of(pixel, &self.pixels[pixel]), counts)
+            ranger.depth(&Known::new(pixel, &self.pixels[pixel]), counts)
         };
         Ok(Ranged {
             pixels: ranger.of_array(counts, depth),

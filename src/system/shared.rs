@@ -150,7 +150,7 @@ impl SharedWork {
     }
 
     /// What frames with these settings share with those whose scenes look like this one.
-    pub(super) fn look(&self, settings: &FrameSettings) -> Arc<Look> {
+    pub(super) fn shared_look(&self, settings: &FrameSettings) -> Arc<Look> {
         let FrameSettings {
             sensor,
             scene,

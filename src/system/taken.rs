@@ -128,9 +128,12 @@ impl TakenSettings {
 impl Asked {
     fn settings(self, path: &Path) -> Result<TakenSettings, InputError> {
         let source = path.display();
-        let sensor = Document::of(format!("{source}, sensor"), self.sensor);
+        let sensor = Document::from_table(format!("{source}, sensor"), self.sensor);
         let sensor = Sensor::from(SensorConfig::read_document(&sensor)?);
-        let scene = Scene::read(&Document::of(format!("{source}, scene"), self.scene))?;
+        let scene = Scene::read(&Document::from_table(
+            format!("{source}, scene"),
+            self.scene,
+        ))?;
         let exposure = Exposure::checked(&sensor, self.stop_periods, self.laser_cycles)
             .map_err(|fault| InputError::new(source, format!("{fault}; take it anew")))?;
         let usual = DepthOptions::default();

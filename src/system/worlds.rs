@@ -29,9 +29,9 @@ pub(super) fn worlds(scene: &Scene, exposure_s: Range<f64>, segments: u32) -> Ve
     let length_s = (exposure_s.end - exposure_s.start) / f64::from(segments);
     let middle_s = |n: u32| exposure_s.start + (f64::from(n) + 0.5) * length_s;
     if scene.is_still() {
-        vec![scene.at(0.0)]
+        vec![scene.snapshot(0.0)]
     } else {
-        (0..segments).map(|n| scene.at(middle_s(n))).collect()
+        (0..segments).map(|n| scene.snapshot(middle_s(n))).collect()
     }
 }
 
@@ -86,7 +86,7 @@ pub(super) fn lights(
 
 impl LastWorld {
     /// Of the worlds of an exposure, of which there is at least one.
-    pub(super) fn of(
+    pub(super) fn new(
         worlds: &[Scene],
         truths: Vec<GroundTruth>,
         lights: Vec<Vec<PixelLight>>,

@@ -72,7 +72,7 @@ fn edges(waves: &Path, sensor: &Sensor, checks: &mut Checks) -> Result<(), Input
     let place = (0, COLUMN);
     let mut gate = GateSimulation::new(sensor, &exposure, place, (1, 2), &STARTS, &pulses);
     let netlist = Arc::clone(gate.netlist());
-    let local_stop = SensorPins::of(&netlist).local_stop;
+    let local_stop = SensorPins::find(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
     write_waves(waves, &netlist, &view(sensor, &exposure, origin), |waves| {

@@ -67,7 +67,7 @@ struct Bench {
 impl Bench {
     fn new(config: SensorConfig) -> Self {
         let netlist = load_netlist(&config);
-        let pins = LoadPins::of(&netlist);
+        let pins = LoadPins::find(&netlist);
         let mut bench = Bench {
             resetb: pins.resetb,
             enable: pins.enable,

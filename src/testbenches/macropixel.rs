@@ -238,7 +238,7 @@ fn two_windows(
     let lists = [&pulses[..], &pulses[..]];
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &starts, &lists);
     let netlist = Arc::clone(gate.netlist());
-    let local_stop = SensorPins::of(&netlist).local_stop;
+    let local_stop = SensorPins::find(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
     // Edges of the bins of both windows, the earlier one's first.

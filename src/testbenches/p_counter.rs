@@ -120,7 +120,7 @@ impl Bench {
             && config.step_periods == 1
             && config.p_counter_block.is_none();
         let netlist = circuit(&config);
-        let probes = Probes::at(&netlist, "");
+        let probes = Probes::below_instance(&netlist, "");
         let net = |probe| probes.net(probe);
         Bench {
             clk: net(Probe::Clk),
@@ -137,7 +137,7 @@ impl Bench {
             inner: is_known
                 .then(|| [Probe::Memory, Probe::CounterOut].map(|p| probes.bus(p).to_vec())),
             local_stop: net(Probe::LocalStop),
-            timing: ChipTiming::of(&config),
+            timing: ChipTiming::new(&config),
             config,
             netlist,
         }
@@ -209,7 +209,7 @@ impl Bench {
 }
 
 fn first_edge(config: &SensorConfig, start: u64) -> Option<i64> {
-    Some(p_counter::Rises::of(config, start as u16)?.first)
+    Some(p_counter::Rises::from_start_value(config, start as u16)?.first)
 }
 
 /// P-counter and timing block, connected as in a macropixel.

@@ -75,7 +75,7 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         readout_pins: 2,
         ..SensorConfig::default()
     };
-    let order = ReadoutOrder::of(&config);
+    let order = ReadoutOrder::new(&config);
     let exposure = Exposure::new(&config, 64, 16);
     let starts: Vec<u16> = (0..config.pixels() as u16).map(|i| 20 + 3 * i).collect();
     let next: Vec<u16> = starts.iter().map(|start| 511 - start).collect();
@@ -86,10 +86,10 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let size = (config.rows, config.cols);
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), size, &starts, &photons);
     let netlist = std::sync::Arc::clone(gate.netlist());
-    let pins = ReadPins::of(&netlist);
+    let pins = ReadPins::find(&netlist);
     let (word_load, load_clk) = (
         ReadProbe::WordLoad.net(&netlist),
-        LoadPins::of(&netlist).clk,
+        LoadPins::find(&netlist).clk,
     );
     let mut recorder = Recorder::new([pins.clk, pins.enable, word_load, load_clk]);
     let counted = gate.schedule().counted;
@@ -167,12 +167,12 @@ fn clocks(checks: &mut Checks) {
         readout_pins: 1,
         ..SensorConfig::default()
     };
-    let netlists = PinNetlists::of(&config);
+    let netlists = PinNetlists::new(&config);
     let most = ((1u32 << config.bin_bits) - 1) as u16;
     let counts: Vec<u16> = (0..config.pixels() * config.bins)
         .map(|i| (i as u16).wrapping_mul(0x9e37) & most)
         .collect();
-    let order = ReadoutOrder::of(&config);
+    let order = ReadoutOrder::new(&config);
     for mhz in CLOCKS_MHZ {
         let found = netlists.run_at(mhz, &config, &counts);
         let (load, read) = (found.load.as_s() * 1e6, found.read.as_s() * 1e6);
@@ -193,8 +193,8 @@ fn clocks(checks: &mut Checks) {
 fn whole_array(checks: &mut Checks) {
     let config = SensorConfig::default();
     let counts = sparse_counts(&config);
-    let netlists = PinNetlists::of(&config);
-    let pins = ReadoutOrder::of(&config).pins();
+    let netlists = PinNetlists::new(&config);
+    let pins = ReadoutOrder::new(&config).pins();
     for mhz in CLOCKS_MHZ {
         let found = netlists.run_at(mhz, &config, &counts);
         let (load, read) = (found.load.as_s() * 1e6, found.read.as_s() * 1e6);
@@ -225,7 +225,7 @@ fn whole_array(checks: &mut Checks) {
 fn view(config: &SensorConfig, counted: Time) -> Layout {
     let word = config
         .read_clock()
-        .periods(ReadoutOrder::of(config).word_periods() as i64);
+        .periods(ReadoutOrder::new(config).word_periods() as i64);
     let readout = [
         Entry::binary(ReadProbe::Enable.path()),
         Entry::binary(ReadProbe::Clk.path()),

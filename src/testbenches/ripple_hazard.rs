@@ -250,7 +250,7 @@ fn far_from_the_crossing(checks: &mut Checks) {
 /// The shortest period with the right histogram, by simulation, against static timing.
 fn crossing(checks: &mut Checks) {
     let silicon = Silicon::nominal(Corner::Typ);
-    let paths = MacropixelTiming::of(&config(), &silicon, Limits::Ignored, (0, 0));
+    let paths = MacropixelTiming::analyse(&config(), &silicon, Limits::Ignored, (0, 0));
     let counts = |period| {
         outcome(period, Policy::ReportOnly)
             .pixels
@@ -286,7 +286,7 @@ fn between() -> (Time, Vec<bool>) {
         mismatch: Some(MISMATCH),
         ..Silicon::nominal(Corner::Typ)
     };
-    let paths = MacropixelTiming::of(&config(), &silicon, Limits::Ignored, (0, 1));
+    let paths = MacropixelTiming::analyse(&config(), &silicon, Limits::Ignored, (0, 1));
     let hit_cells = paths.probes.hit_cells(&paths.netlist);
     let strobe_after_shift = |bin: usize| {
         let of_hit = paths.hits.iter().filter(|r| r.kind == CheckKind::Hold);

@@ -89,7 +89,7 @@ fn clocked() -> Tdc {
 
 fn ring() -> Tdc {
     let (netlist, timing) = made(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
-    let model = ring_oscillator::Model::of(&netlist, &timing, "");
+    let model = ring_oscillator::Model::from_netlist(&netlist, &timing, "");
     Tdc {
         name: "ring oscillator",
         seed: 2,
@@ -243,14 +243,14 @@ impl Tdc {
         // Codes between the first and the last have both edges within the range.
         let inner = &counts[1..CODES];
         Density {
-            linearity: Linearity::of(inner),
+            linearity: Linearity::from_widths(inner),
             counts,
         }
     }
 
     /// What the elements' delays say.
     fn expected(&self) -> Linearity {
-        Linearity::of(&self.steps.widths_s())
+        Linearity::from_widths(&self.steps.widths_s())
     }
 }
 

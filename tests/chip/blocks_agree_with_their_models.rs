@@ -128,7 +128,7 @@ proptest! {
             corner,
             ..SensorConfig::default()
         };
-        let timing = ChipTiming::of(&delay_line);
+        let timing = ChipTiming::new(&delay_line);
         // In bursts, shorter than some XORs take.
         let at = |burst: i64, within: i64| SETTLING * 2 + Time::from_ns(2) * burst + Time::from_fs(within);
         let mut pulses: Vec<(Time, u8)> = pulses
@@ -429,7 +429,7 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
     let bus = |path: &str| netlist.signal(path).unwrap();
     let (timed, code, threshold) = (bus("SPAD_TIMED"), bus("TYPE"), bus("THRESHOLD"));
     let event = netlist.net("SPAD_EVENT").unwrap();
-    let step = ChipTiming::of(&SensorConfig::default()).clk_to_event;
+    let step = ChipTiming::new(&SensorConfig::default()).clk_to_event;
     let mut kernel = LaneKernel::new(&netlist, &timing);
     let mut now = Time::ZERO;
     let (mut compared, mut met) = (0u64, [0u64; 3]);

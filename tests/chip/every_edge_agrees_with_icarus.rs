@@ -26,7 +26,7 @@ const NAMES: [&str; 2] = ["the kernel", "Icarus"];
 
 /// Runs all macropixels of a small sensor, with their load path, in both simulators.
 fn compare_sensor(scenario: &Scenario) -> Figures {
-    compare_silicon(scenario, &Silicon::of(&scenario.config))
+    compare_silicon(scenario, &Silicon::new(&scenario.config))
 }
 
 /// The same with the delays of this silicon.
@@ -42,7 +42,7 @@ fn compare_silicon(scenario: &Scenario, silicon: &Silicon) -> Figures {
     let size = (config.rows, config.cols);
     let sensor = Sensor::from(config).made_of(silicon);
     let plan = StimulusPlan::new(&sensor, exposure, size.1, starts, &pulses);
-    if *silicon == Silicon::of(config) {
+    if *silicon == Silicon::new(config) {
         export_verilog(folder.path(), config, Some(&plan), None).unwrap();
     } else {
         let timing = silicon.timing(&Netlist::elaborate(&array::circuit(config)));
@@ -113,7 +113,7 @@ fn sensors_of_another_kind() {
                 ..(*sensor).clone()
             };
             // The chip as it is, and then in any silicon.
-            let mut silicon = Silicon::of(&config);
+            let mut silicon = Silicon::new(&config);
             if seed > 0 {
                 config.corner = Corner::ALL[random.random_range(0..3)];
                 config.clk_skew_ps = random.random_range(0.0..=200.0);

@@ -70,7 +70,7 @@ proptest! {
             ..SensorConfig::default()
         };
         let mut bench = Bench::new(&front_end::circuit(&config), corner);
-        let timing = ChipTiming::of(&config);
+        let timing = ChipTiming::new(&config);
         let dead_time = Time::from_ns(2);
         let rise = |k: i64| SETTLING * 2 + Time::from_ps(period_ps) * k;
         let to_next_edge = |time: Time| {
@@ -125,7 +125,7 @@ proptest! {
         };
         prop_assert_eq!(config.check(), Ok(()));
         let exposure = Exposure::new(&config, 48, 4);
-        let timing = ChipTiming::of(&config);
+        let timing = ChipTiming::new(&config);
         let to_next_edge = |time: Time| {
             let mut edges = (time.as_fs() as f64 * config.clk_hz * 1e-15) as i64 - 2..;
             edges.find_map(|edge| {

@@ -58,7 +58,7 @@ impl Seen {
 
     /// By our kernel, which has yet to run an array of `cols` columns.
     pub fn by_kernel(gate: &mut GateSimulation, cols: usize) -> Self {
-        let local_stops = SensorPins::of(gate.netlist()).local_stop;
+        let local_stops = SensorPins::find(gate.netlist()).local_stop;
         let mut recorder = Recorder::new(local_stops.clone());
         gate.run(&mut recorder);
         let origin = gate.schedule().origin;

@@ -81,7 +81,7 @@ pub struct Mapped {
 }
 
 impl Mapped {
-    pub fn of(text: &str, chip: SensorConfig) -> Self {
+    pub fn new(text: &str, chip: SensorConfig) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let liberty = folder.path().join("cells.lib");
         std::fs::write(&liberty, text).unwrap();
@@ -94,7 +94,10 @@ impl Mapped {
             ..chip
         };
         config.check().unwrap_or_else(|e| panic!("{e}"));
-        let of_library = CellLibrary::of(&config).unwrap().from_file().unwrap();
+        let of_library = CellLibrary::from_config(&config)
+            .unwrap()
+            .from_file()
+            .unwrap();
         // An `input_slew_ps` of 0 leaves the library's own.
         assert!(of_library.environment.input_slew_fs > 0.0);
         let netlist = Netlist::elaborate(&macropixel::circuit(&config));

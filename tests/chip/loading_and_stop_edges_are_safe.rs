@@ -69,7 +69,12 @@ impl Bench {
         let mut kernel = Kernel::new(&netlist, &Timing::nominal(&netlist, &library, Corner::Typ));
         let local_stop = nets("LOCAL_STOP")[0];
         let mut recorder = Recorder::new([local_stop]);
-        let mut events = HardwareEvents::new(&netlist, &config, &[Probes::at(&netlist, "")], ns(3));
+        let mut events = HardwareEvents::new(
+            &netlist,
+            &config,
+            &[Probes::below_instance(&netlist, "")],
+            ns(3),
+        );
         let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ)
             .policy(Policy::ReportOnly)
             .not_before(ns(20));
@@ -383,7 +388,7 @@ proptest! {
 
         let law = WindowLaw::new(&config, &exposure);
         let latency = law.timing().spad_to_sampled;
-        let cancelling = Cancelling::of(config.dead_time(), exposure.clock, || law).unwrap();
+        let cancelling = Cancelling::from_law(config.dead_time(), exposure.clock, || law).unwrap();
         let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[20], &[&pulses]);
         let toggled = gate.schedule().origin + latency;
         let told: Vec<(i64, String)> = cancelling

@@ -185,8 +185,9 @@ fn edge_by_edge() {
             .filter(|chip| !chip.reset_to_load);
         for (seed, chip) in (0..).zip(chips) {
             let p_counter = chip.p_counter;
-            let mapped = Mapped::of(&text, chip);
-            let verdict = TimingVerdict::of(&mapped.config, &Silicon::of(&mapped.config), (0, 0));
+            let mapped = Mapped::new(&text, chip);
+            let verdict =
+                TimingVerdict::analyse(&mapped.config, &Silicon::new(&mapped.config), (0, 0));
             if verdict.worst().slack < Time::from_ps(-50) {
                 continue;
             }

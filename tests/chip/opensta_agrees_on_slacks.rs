@@ -348,7 +348,7 @@ fn of_every_endpoint_of_a_macropixel() {
         // Of each check, and whether no divided clock takes part: agree; ours asks more; OpenSTA asks more.
         let mut counted: BTreeMap<(&str, bool), [usize; 3]> = BTreeMap::new();
         for chip in library_chips::chips() {
-            let mapped = Mapped::of(&text, chip);
+            let mapped = Mapped::new(&text, chip);
             let p_counter = mapped.config.p_counter;
             let report = mapped.opensta(COMMANDS);
             assert!(!report.contains("Error"), "{name}: {report}");

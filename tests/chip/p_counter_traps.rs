@@ -366,7 +366,7 @@ fn enabling_while_clk_is_low_counts_one_step_too_many() {
         let enable = SETTLING * if enabled_low { 11 } else { 10 } + HALF;
         bench.drive(enable, "ENABLE", true);
         let falls = if enabled_low { 3 } else { 4 };
-        let probes = Probes::at(&bench.netlist, "");
+        let probes = Probes::below_instance(&bench.netlist, "");
         let out = probes.bus(Probe::CounterOut);
         let mut run = bench.start(&[]);
         let found = run.number_at(SETTLING * 18, out);

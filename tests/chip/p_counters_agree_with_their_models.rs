@@ -194,7 +194,7 @@ fn the_ripple_is_the_sum_of_its_stages() {
                 corner,
                 ..SensorConfig::default()
             };
-            let timing = ChipTiming::of(&config).counter;
+            let timing = ChipTiming::new(&config).counter;
             let expected = ripple + last;
             assert_eq!(timing.clk_to_local_stop, expected, "{p_counter:?} {tap:?}");
         }

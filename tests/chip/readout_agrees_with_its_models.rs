@@ -149,7 +149,7 @@ proptest! {
 
     #[test]
     fn any_counts_of_any_array_leave_through_its_pins(config in arrays(), seed: u64) {
-        let order = ReadoutOrder::of(&config);
+        let order = ReadoutOrder::new(&config);
         prop_assert!(order.pins() <= config.readout_pins.min(config.cols));
         let counts = random_counts(&config, seed);
         prop_assert_eq!(&order.counts(&order.streams(&counts)), &counts);
@@ -168,7 +168,7 @@ proptest! {
         share in 0.0..1.0,
         more in 0usize..60,
     ) {
-        let order = ReadoutOrder::of(&config);
+        let order = ReadoutOrder::new(&config);
         let counts = random_counts(&config, seed);
         let mut bench = Bench::new(&readout::with_counts(order), config.corner);
         let nets = bench.bus("COUNT");
@@ -367,7 +367,7 @@ fn a_reading_during_the_exposure_leaves_the_counts_as_they_are() {
         let pulses = scenario.pulses();
         let plan = StimulusPlan::new(config, exposure, 2, starts, &pulses).with_readout();
         let netlist = gate.netlist();
-        let pins = SensorPins::of(netlist);
+        let pins = SensorPins::find(netlist);
         let mut drives: Vec<Drive> = plan.stimulus(&pins).collect();
         let schedule = plan.schedule;
         let mut now = schedule.origin;

@@ -82,7 +82,7 @@ fn p_counters_open_the_same_windows() {
                 return;
             };
             let own = SensorConfig {
-                p_counter_block: Some(OwnBlock::of("block.json", module, &json)),
+                p_counter_block: Some(OwnBlock::from_module("block.json", module, &json)),
                 ..config.clone()
             };
             own.check().unwrap();
@@ -133,7 +133,7 @@ fn a_librarys_cells_count_as_generic_gates_do() {
         "{json}"
     );
     let read = |library: &str| {
-        let mut document = Document::of("a test", toml::Table::new());
+        let mut document = Document::from_table("a test", toml::Table::new());
         let block = folder.path().join("block.json");
         for (key, value) in [
             ("p_counter_block", block.to_str().unwrap()),

@@ -73,7 +73,7 @@ fn besides(command: &str, argument: &str) -> &'static str {
 }
 
 /// The words of a command with `value` for an argument, instead of what it has there.
-pub fn with(command: &str, argument: &Arg, value: &str) -> Vec<String> {
+pub fn words_with(command: &str, argument: &Arg, value: &str) -> Vec<String> {
     let id = argument.get_id().as_str();
     let mut all = words(command);
     // Its other words are not for what was taken.

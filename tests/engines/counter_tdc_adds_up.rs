@@ -299,7 +299,7 @@ fn the_verdict_on_the_timing_knows_when_start_races() {
             clk_hz: clk_mhz * 1e6,
             ..chip(Tdc::Counter)
         };
-        let verdict = TimingVerdict::of(&config, &Silicon::of(&config), (0, 0));
+        let verdict = TimingVerdict::analyse(&config, &Silicon::new(&config), (0, 0));
         let law = WindowLaw::new(&config, &Exposure::new(&config, 60, 1));
         let opens = law.window(3).open().is_some();
         assert!(opens || !verdict.is_met(), "{clk_mhz} MHz: {verdict}");

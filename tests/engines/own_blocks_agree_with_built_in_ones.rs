@@ -29,7 +29,7 @@ fn read_back(config: &SensorConfig) -> SensorConfig {
         p_counter::circuit(config).transistors()
     );
     let own = SensorConfig {
-        p_counter_block: Some(OwnBlock::of("built_in.json", module, &json)),
+        p_counter_block: Some(OwnBlock::from_module("built_in.json", module, &json)),
         ..config.clone()
     };
     own.check().unwrap();
@@ -61,7 +61,7 @@ fn every_built_in_counter_read_back_counts_the_same_on_every_engine() {
         let scenario = scenario::random(random, 1, lanes);
         let config = &scenario.config;
         let own = read_back(config);
-        assert_eq!(ChipTiming::of(&own), ChipTiming::of(config), "{config:?}");
+        assert_eq!(ChipTiming::new(&own), ChipTiming::new(config), "{config:?}");
         let (windows, built_in) = counted(config, &scenario);
         assert_eq!(
             counted(&own, &scenario),
@@ -130,7 +130,7 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
     let json = json.replace(&from, &format!(r#""D": [{}], "C""#, init[1]));
     let module = Module::from_yosys(&json, None).unwrap();
     let config = SensorConfig {
-        p_counter_block: Some(OwnBlock::of("doubled.json", module, &json)),
+        p_counter_block: Some(OwnBlock::from_module("doubled.json", module, &json)),
         cols: 8,
         rows: 1,
         ..built_in
@@ -195,7 +195,7 @@ fn with_own(
     let json = json.to_string();
     let module = Module::from_yosys(&json, None).unwrap();
     let mut config = config.clone();
-    *own(&mut config) = Some(OwnBlock::of(key, module, &json));
+    *own(&mut config) = Some(OwnBlock::from_module(key, module, &json));
     config.check().unwrap();
     config
 }
@@ -216,7 +216,7 @@ fn other_blocks_read_back_count_the_same_on_gates_and_cycles_and_have_no_law() {
         let blocks = LAWLESS.get(which..=which).unwrap_or(&LAWLESS);
         let plain = |config: SensorConfig, block: &Lawless| with_own(&config, *block, |_| ());
         let own = blocks.iter().fold(config.clone(), plain);
-        assert_eq!(ChipTiming::of(&own), ChipTiming::of(config), "{config:?}");
+        assert_eq!(ChipTiming::new(&own), ChipTiming::new(config), "{config:?}");
         let (windows, found) = counted(&own, &scenario);
         assert_eq!(
             found[..2],
@@ -228,9 +228,9 @@ fn other_blocks_read_back_count_the_same_on_gates_and_cycles_and_have_no_law() {
         let why = Window::Irregular(Irregular::OwnBlock(blocks[0].0));
         ran[which] += windows.iter().filter(|window| **window == why).count();
         // What the table of `gdtof timing` asks for.
-        let silicon = Silicon::of(&own);
-        MacropixelTiming::of(&own, &silicon, Limits::Kept, (0, 0));
-        LocalClocks::of(&own, &silicon);
+        let silicon = Silicon::new(&own);
+        MacropixelTiming::analyse(&own, &silicon, Limits::Kept, (0, 0));
+        LocalClocks::analyse(&own, &silicon);
     }
     assert!(ran.iter().all(|&ran| ran > 10), "{ran:?}");
 }

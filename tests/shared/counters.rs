@@ -146,7 +146,7 @@ pub fn drawn(which: usize, random: &mut StdRng) -> Drawn {
         kind,
         hidden,
         config: SensorConfig {
-            p_counter_block: Some(OwnBlock::of("random.json", module, &json)),
+            p_counter_block: Some(OwnBlock::from_module("random.json", module, &json)),
             ..config
         },
         named,

@@ -80,7 +80,7 @@ impl PairArgs {
     ///
     /// # Errors
     /// Files that cannot be read or do not make a pair; a calibration that is impossible or gives no depth.
-    pub(super) fn take(
+    pub(super) fn match_pair(
         &self,
         sensor: &SensorConfig,
         optics: Scene,
@@ -155,7 +155,7 @@ impl PairArgs {
         let shape = Shape::Map {
             centre_m: -from_camera_m,
             yaw_deg: 0.0,
-            map: Arc::new(DepthMap::of(files, raster)?),
+            map: Arc::new(DepthMap::from_depths(files, raster)?),
         };
         let mut scene = optics;
         scene.objects = vec![Object::new("pair", 1.0, shape)];
@@ -181,7 +181,7 @@ impl PairArgs {
                 None => "the pair's own depths",
             },
             matched: map.matched(),
-            disparity_errors: truth.map(|truth| Errors::of(&map, &truth)),
+            disparity_errors: truth.map(|truth| Errors::new(&map, &truth)),
         };
         Ok(Some(Taken {
             scene,

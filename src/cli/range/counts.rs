@@ -10,7 +10,7 @@ use super::args::RangeArgs;
 use super::crosstalk;
 use super::detector::{described_detector, description, within};
 use super::returns::{shown, write_further, write_further_head};
-use crate::cli::voice::{note, say_json, tell};
+use crate::cli::voice::{note, say_json, say_unless_quiet};
 use crate::files::{HistogramFormat, Histograms, InputError, OutputFile, ZoneCounts};
 use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
 use crate::report::Table;
@@ -113,7 +113,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         let row = format!("{lit} of {}", glass.len());
         table.push("zones with light of a cover glass", row);
     }
-    Ok(tell(table)?)
+    Ok(say_unless_quiet(table)?)
 }
 
 /// Zones whose histogram is that of the zone before them.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::args::RangeArgs;
 use super::returns::{shown, write_further, write_further_head};
 use crate::cli::quality;
-use crate::cli::voice::{say_json, tell};
+use crate::cli::voice::{say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
@@ -65,7 +65,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     }
     let mut table = Table::new(format!("Depths of {}", args.histograms.display()));
     quality::rows(&mut table, &options, &ranged.summary());
-    Ok(tell(table)?)
+    Ok(say_unless_quiet(table)?)
 }
 
 fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::args::{Fit, RangeArgs};
 use super::returns::shown;
-use crate::cli::voice::{say_json, tell};
+use crate::cli::voice::{say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
@@ -149,7 +149,7 @@ struct Errors {
 
 impl Errors {
     /// `None` without any.
-    fn of(errors_m: impl Iterator<Item = f64>) -> Option<Self> {
+    fn new(errors_m: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut n, mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0, 0f64);
         for error in errors_m {
             n += 1.0;
@@ -246,7 +246,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
             let line = Calibration::fit(zones, &known).ok();
             line.and_then(|line| {
                 let known = reported.iter().filter_map(|s| own(s));
-                Errors::of(known.map(|(echo, true_m)| line.depth_m(&echo) - true_m))
+                Errors::new(known.map(|(echo, true_m)| line.depth_m(&echo) - true_m))
             })
         }
     };
@@ -279,8 +279,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         reported: reported.len(),
         fit: args.calibration.is_none().then_some(fit),
         median_m: median(reported.iter().map(|s| depth(s))).unwrap_or(f64::NAN),
-        depths: Errors::of(reported.iter().filter_map(|s| Some(depth(s) - s.true_m?))),
-        sensor: Errors::of(
+        depths: Errors::new(reported.iter().filter_map(|s| Some(depth(s) - s.true_m?))),
+        sensor: Errors::new(
             reported
                 .iter()
                 .filter_map(|s| Some(s.sensor_m? - s.true_m?)),
@@ -291,7 +291,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     if args.json {
         return say_json(&report);
     }
-    tell(table(&report))?;
+    say_unless_quiet(table(&report))?;
     Ok(())
 }
 

@@ -112,7 +112,7 @@ fn cases() -> Vec<(&'static str, Trial)> {
     let case = |signal, times_daylight: f64| Trial::new(signal, times_daylight * DAYLIGHT_HZ, 0);
     let long = |overflow, cycles| Trial {
         cycles,
-        ..case(0.3, 15.0).on(|sensor| sensor.overflow = overflow)
+        ..case(0.3, 15.0).with_sensor_change(|sensor| sensor.overflow = overflow)
     };
     let cases = vec![
         ("daylight, a narrow echo", case(0.05, 1.0)),
@@ -128,15 +128,15 @@ fn cases() -> Vec<(&'static str, Trial)> {
         ("60 x daylight", case(1.0, 60.0)),
         (
             "15 x daylight, paralysable SPADs of 8 ns",
-            case(0.3, 15.0).on(|sensor| sensor.paralysable = true),
+            case(0.3, 15.0).with_sensor_change(|sensor| sensor.paralysable = true),
         ),
         (
             "daylight, 2 SPADs at a time",
-            case(0.05, 1.0).on(|sensor| sensor.threshold = 1),
+            case(0.05, 1.0).with_sensor_change(|sensor| sensor.threshold = 1),
         ),
         (
             "60 x daylight, 5 SPADs at a time",
-            case(1.0, 60.0).on(|sensor| sensor.threshold = 4),
+            case(1.0, 60.0).with_sensor_change(|sensor| sensor.threshold = 4),
         ),
         (
             "15 x daylight, 40 000 cycles, saturating",

@@ -94,7 +94,7 @@ pub(crate) struct OnChip {
 
 impl OnChip {
     /// What was measured at a range.
-    pub(crate) fn at(&self, range_m: f64) -> &AtRange {
+    pub(crate) fn result(&self, range_m: f64) -> &AtRange {
         let at = self.ranges.iter().find(|at| at.range_m == range_m);
         at.expect("a range that is measured")
     }

@@ -73,7 +73,8 @@ fn coarse(system: &System, bin_m: f64, candidates: u32, range_m: f64) -> Trial {
 
 /// The guided chip with bins of the system's measurement, an echo of `range_m` in mid-window.
 fn fine(system: &System, range_m: f64, cycles: u32) -> Trial {
-    Trial::of_link(&system.link, range_m, cycles).on(|sensor| sensor.clk_hz = 1.0 / system.bin_s)
+    Trial::of_link(&system.link, range_m, cycles)
+        .with_sensor_change(|sensor| sensor.clk_hz = 1.0 / system.bin_s)
 }
 
 /// Eq. 17 with every photon counted, ties by lot.

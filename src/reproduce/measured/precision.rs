@@ -192,7 +192,7 @@ fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
 fn failures(frames: usize) -> Result<Grid, EngineError> {
     let effects = [Effect::DeadTime, Effect::OneHit, Effect::Overflow];
     let mut grid = measurement(2).grid(1);
-    let narrow = trial(4.0).on(|sensor| sensor.bin_bits = 10);
+    let narrow = trial(4.0).with_sensor_change(|sensor| sensor.bin_bits = 10);
     let wide = Trial {
         sigma_ns: 8.0 * sigma_over_fwhm(),
         ..trial(2.0)

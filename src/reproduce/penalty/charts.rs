@@ -26,7 +26,7 @@ struct Curves {
 type Points = Vec<(f64, f64)>;
 
 impl Curves {
-    fn of(system: System, to_m: u32) -> Self {
+    fn new(system: System, to_m: u32) -> Self {
         let windows = full_bins(f64::from(to_m), system.window_m);
         let window_end_m = |window: u32| f64::from(window) * system.window_m;
         let detecting = (1..=windows).map(|window| {
@@ -89,7 +89,7 @@ impl Curves {
 /// Fig. 35: laser cycles of a full histogram.
 pub(in crate::reproduce) fn figure_35() -> Chart {
     let fits = |z_m: f64| SPEED_OF_LIGHT_M_PER_S / (2.0 * z_m * 30.0);
-    let needed = Curves::of(long_range(), 200).full();
+    let needed = Curves::new(long_range(), 200).full();
     chart(35)
         .line("needed, Cramér-Rao", needed)
         .line(
@@ -101,7 +101,7 @@ pub(in crate::reproduce) fn figure_35() -> Chart {
 
 /// Fig. 42: laser cycles of the detection step.
 pub(in crate::reproduce) fn figure_42() -> Chart {
-    let detecting = |system: System| Curves::of(system, 200).detecting();
+    let detecting = |system: System| Curves::new(system, 200).detecting();
     chart(42)
         .line("every photon counts (thesis)", detecting(long_range()))
         .dashed(
@@ -144,7 +144,7 @@ fn points(on_chip: &OnChip, of: impl Fn(&AtRange) -> Option<f64>) -> Points {
 }
 
 fn schemes(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
-    let curves = Curves::of(on_chip.system, to_m);
+    let curves = Curves::new(on_chip.system, to_m);
     let measured = |of: fn(&AtRange) -> Option<f64>| points(on_chip, of);
     chart(figure)
         .line("full and guided", curves.full())
@@ -159,8 +159,8 @@ fn schemes(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
 }
 
 fn penalties(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
-    let curves = Curves::of(on_chip.system, to_m);
-    let chip = Curves::of(one_hit(on_chip.system), to_m);
+    let curves = Curves::new(on_chip.system, to_m);
+    let chip = Curves::new(one_hit(on_chip.system), to_m);
     chart(figure)
         .line("guided", [(1.0, 1.0), (f64::from(to_m), 1.0)])
         .line("zooming", curves.penalty_of_zooming())

@@ -72,7 +72,7 @@ fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
         scale,
     } = range.clone().try_into().map_err(|e: toml::de::Error| {
         let said = e.message().trim();
-        match Misfit::of(said) {
+        match Misfit::from_message(said) {
             Some(misfit) => format!(
                 "{name}: {}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}",
                 misfit.without_cure()

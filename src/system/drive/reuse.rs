@@ -51,7 +51,7 @@ pub(super) struct Same<'l> {
 }
 
 impl<'l> Same<'l> {
-    pub(super) fn of(last: Option<&'l Last>, light: &Light) -> Self {
+    pub(super) fn new(last: Option<&'l Last>, light: &Light) -> Self {
         let is_same = match last {
             None => vec![false; light.pixels.len()],
             Some(last) => {

@@ -9,7 +9,7 @@ use crate::engine::{Answer, Histograms, LitPixel, Work, expose};
 use crate::guide::{GuideInput, GuideMap};
 use crate::scene::DVec3;
 use crate::system::error::FrameError;
-use crate::system::frame::{go_on, load_starts};
+use crate::system::frame::{check_not_stopped, load_starts};
 use crate::system::light::{lit, photon_stream, starts_of};
 use crate::system::pixel::PixelDepth;
 use crate::system::ranger::Known;
@@ -46,7 +46,7 @@ impl Drive<'_> {
             Noise::Still => frame.seed,
         };
         let mut clock = Stopwatch::new();
-        let mut world = scene.at(times.images_s);
+        let mut world = scene.snapshot(times.images_s);
         if let Some(calibration) = &self.self_calibration {
             world = calibration.rectified(world);
         }
@@ -62,7 +62,7 @@ impl Drive<'_> {
         };
         let guide = frame.guide.estimate(&input)?;
         spent.run.guide_s = clock.lap();
-        go_on(exposed(0))?;
+        check_not_stopped(exposed(0))?;
 
         let seen: Vec<Option<f64>> = last
             .map(|last| last.pixels.iter().map(|p| p.measured_m).collect())
@@ -116,7 +116,7 @@ impl Drive<'_> {
                 let lights = worlds::lights(&worlds, &truths, &stream, known, reuse);
                 let each = worlds::light_of(&lights, exposure);
                 let truth = truths[truths.len() / 2].clone();
-                (truth, each, LastWorld::of(&worlds, truths, lights))
+                (truth, each, LastWorld::new(&worlds, truths, lights))
             }
         };
         let pixels = lit(sensor, &plan.wanted, &each);

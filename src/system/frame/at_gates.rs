@@ -57,7 +57,7 @@ impl AtGates {
         let (part, pulses) = (&probed.exposure, probed.simulated());
         let mut simulation = GateSimulation::new(sensor, part, at, (1, 1), &[start], &[pulses]);
         let view = View::of_pixel(at, sensor, part, start, pulses, probe.wave_cycles);
-        let format = WaveFormat::of(&probe.waves);
+        let format = WaveFormat::from_path(&probe.waves);
         waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
         probed.counts = simulation.histograms()?.into_counts();
         Ok(probed)

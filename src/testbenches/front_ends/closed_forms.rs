@@ -30,7 +30,7 @@ impl Laws {
     pub(super) fn new(bench: &Bench) -> Self {
         let library = Library::generic_40nm();
         let delay = |kind, to| library.delay(kind, 0, to, Corner::Typ).as_s();
-        let width_s = ChipTiming::of(&bench.config)
+        let width_s = ChipTiming::new(&bench.config)
             .pulses
             .shaped
             .expect("it shapes")

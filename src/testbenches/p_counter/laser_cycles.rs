@@ -136,7 +136,11 @@ mod tests {
         let text = format!("{has_memory} {late}");
         SensorConfig {
             counter_bits: bits,
-            p_counter_block: Some(OwnBlock::of("mine.json", m.finish().unwrap(), &text)),
+            p_counter_block: Some(OwnBlock::from_module(
+                "mine.json",
+                m.finish().unwrap(),
+                &text,
+            )),
             ..SensorConfig::default()
         }
     }

@@ -47,7 +47,7 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
         3,
         CellKind::Dffsr.area() / custom.area(),
     );
-    let rows = PCounter::ALL.map(Row::of);
+    let rows = PCounter::ALL.map(Row::measure);
     for (p_counter, row) in PCounter::ALL.into_iter().zip(&rows) {
         row.check(p_counter.name(), checks);
         grid.push(row.cells(p_counter.name()));
@@ -96,7 +96,7 @@ struct Row {
 }
 
 impl Row {
-    fn of(p_counter: PCounter) -> Self {
+    fn measure(p_counter: PCounter) -> Self {
         let config = sensor(p_counter);
         let blocks = [
             p_counter::circuit(&config),
@@ -112,8 +112,8 @@ impl Row {
         let arrivals = arrivals.expect("a P-counter has no loop");
         let nets = (0..netlist.net_count()).map(NetId::new);
         let settled = nets.filter_map(|net| arrivals.window(net)).map(|w| w.1);
-        let activity = Activity::of(&config, &netlist);
-        let by_paths = MacropixelTiming::of(&config, &TYPICAL, Limits::Ignored, (0, 0));
+        let activity = Activity::simulate(&config, &netlist);
+        let by_paths = MacropixelTiming::analyse(&config, &TYPICAL, Limits::Ignored, (0, 0));
         let ripple = ripple(&config, &TYPICAL);
         Row {
             stage: p_counter.stage_transistors(),
@@ -214,7 +214,7 @@ struct Activity {
 impl Activity {
     /// Counts slowly from start value 0, which a rippling up counter passes through at every power of two, until the
     /// count has come round.
-    fn of(config: &SensorConfig, netlist: &Netlist) -> Self {
+    fn simulate(config: &SensorConfig, netlist: &Netlist) -> Self {
         const GAP: Time = Time::from_ns(10);
         let pin = |name| netlist.net(name).expect("a net of the P-counter");
         let counts = usize::from(config.largest_start()) + 3;

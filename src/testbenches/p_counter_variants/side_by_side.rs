@@ -70,11 +70,11 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
 
     for p_counter in PCounter::ALL {
         let (name, config) = (p_counter.name(), config(p_counter));
-        let probes = Probes::at(&netlist, name);
+        let probes = Probes::below_instance(&netlist, name);
         let is_reset = p_counter.row().has_memory;
         let first = i64::from(START) + i64::from(is_reset);
         let edges = (first..).step_by(STOP_PERIODS as usize);
-        let ripple = ChipTiming::of(&config).ripple();
+        let ripple = ChipTiming::new(&config).ripple();
         let expected: Vec<Time> = edges
             .take(CYCLES as usize)
             .map(|edge| fall(edge) + ripple)
@@ -155,7 +155,7 @@ fn view(netlist: &Netlist, end: Time) -> Layout {
     let shared = ["CLK", "STOP", "ENABLE"].map(Entry::binary);
     let mut groups = vec![Group::new("Global signals", shared)];
     for p_counter in PCounter::ALL {
-        let probes = Probes::at(netlist, p_counter.name());
+        let probes = Probes::below_instance(netlist, p_counter.name());
         let own = p_counter.row().nets.iter();
         let own = own.map(|net| Entry::binary(format!("{}.{net}", probes.p_counter())));
         let shown = [

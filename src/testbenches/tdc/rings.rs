@@ -66,7 +66,8 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let falls = recorder.falling_edges(net);
         // The first fall is from rest.
         let periods: Vec<Time> = falls.windows(2).map(|ends| ends[1] - ends[0]).collect();
-        let model = ring_oscillator::Model::of(&netlist, &timing, &format!("pixel_{pixel}"));
+        let model =
+            ring_oscillator::Model::from_netlist(&netlist, &timing, &format!("pixel_{pixel}"));
         wrong += periods
             .iter()
             .filter(|&&period| period != model.period)

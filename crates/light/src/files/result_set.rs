@@ -86,7 +86,7 @@ pub fn file_hash(path: &Path) -> io::Result<(u64, String)> {
 }
 
 impl ManifestFile {
-    fn of(folder: &Path, name: &str) -> io::Result<Self> {
+    fn from_file(folder: &Path, name: &str) -> io::Result<Self> {
         let (bytes, sha256) = file_hash(&folder.join(name))?;
         Ok(ManifestFile {
             name: name.to_owned(),
@@ -242,7 +242,7 @@ impl ResultSet {
         };
         let others = others
             .iter()
-            .map(|name| ManifestFile::of(&self.folder, name));
+            .map(|name| ManifestFile::from_file(&self.folder, name));
         let others = others.collect::<io::Result<_>>().map_err(failed)?;
         self.put(&switch, [files, others], previous_files, configuration)
             .map_err(failed)?;
@@ -258,7 +258,7 @@ impl ResultSet {
             names.push(name.map_err(|name| io::Error::other(format!("{name:?} is not text")))?);
         }
         names.sort();
-        let describe = |name: &String| ManifestFile::of(staging, name);
+        let describe = |name: &String| ManifestFile::from_file(staging, name);
         names.iter().map(describe).collect()
     }
 
@@ -316,7 +316,7 @@ impl Switch {
             // Hashing is for those that might be.
             Ok(about.is_file()
                 && known.iter().any(|f| f.bytes == about.len())
-                && known.contains(&&ManifestFile::of(folder, name)?))
+                && known.contains(&&ManifestFile::from_file(folder, name)?))
         };
         let exists = |name: &str| fs::symlink_metadata(folder.join(name)).is_ok();
         let mut switch = Switch::default();
@@ -330,7 +330,7 @@ impl Switch {
             let is_same = || -> io::Result<bool> {
                 Ok(about.is_file()
                     && about.len() == file.bytes
-                    && ManifestFile::of(folder, name)? == *file)
+                    && ManifestFile::from_file(folder, name)? == *file)
             };
             if !is_ours(name)? && !is_same()? {
                 let other = free_name(name, exists);

@@ -193,7 +193,7 @@ fn part_at_gaps(glints: &mut [Glint], gap_fs: f64) {
 
 /// Adds the groups of `glints`, which are in order of time, to `groups`.
 fn part(glints: &[Glint], resolution_fs: f64, groups: &mut SmallVec<[Group; 1]>) {
-    let group = Group::of(glints);
+    let group = Group::new(glints);
     if group.photons == 0.0 {
         return;
     }
@@ -244,7 +244,7 @@ fn depth_fs(glints: &[Glint]) -> f64 {
 
 /// Adds slices of one deep surface, equally deep, of `slice_fs` at most.
 fn slice(glints: &[Glint], slice_fs: f64, groups: &mut SmallVec<[Group; 1]>) {
-    let group = Group::of(glints);
+    let group = Group::new(glints);
     if group.photons == 0.0 {
         return;
     }
@@ -312,7 +312,7 @@ struct Group {
 }
 
 impl Group {
-    fn of(glints: &[Glint]) -> Self {
+    fn new(glints: &[Glint]) -> Self {
         let photons: f64 = glints.iter().map(|glint| glint.photons).sum();
         let origin_fs = glints.first().map_or(0.0, |glint| glint.arrival_fs);
         let late = |glint: &Glint| glint.photons * (glint.arrival_fs - origin_fs);

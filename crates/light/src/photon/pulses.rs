@@ -88,7 +88,7 @@ impl PhotonStream {
                 by_cycle.sort(&draw, light);
                 for cycle in 0..cycles {
                     let start = self.cycle_start(group.first_cycle() + cycle);
-                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| {
+                    photons.extend(by_cycle.cycle_photons(cycle).iter().map(|&photon| {
                         Photon::new(
                             start + Time::from_fs(photon >> SPAD_SHIFT),
                             (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
@@ -160,7 +160,7 @@ impl PhotonStream {
             while next_echo < config.laser_cycles && may_begin(next_echo) {
                 echoes.add(next_echo);
                 for (light, listed) in parts.iter().zip(&mut listed) {
-                    photons.extend_from_slice(listed.of(light, next_echo));
+                    photons.extend_from_slice(listed.photons(light, next_echo));
                 }
                 next_echo += 1;
             }

@@ -61,9 +61,9 @@ impl Document {
     /// When it is no TOML, or has a list that is too long, with the line; when the text is too long.
     pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
         let table: Table = crate::files::parse_toml(&source, text)?;
-        let mut document = Self::of(source, table);
+        let mut document = Self::from_table(source, table);
         if let Ok(spans) = DeTable::parse(text) {
-            let (ends, mut long) = (LineEnds::of(text), Vec::new());
+            let (ends, mut long) = (LineEnds::new(text), Vec::new());
             note_lines(spans.get_ref(), "", &ends, &mut document.origins, &mut long);
             document.complain(long)?;
         }
@@ -89,7 +89,7 @@ impl Document {
     }
 
     /// Settings that stand in no file.
-    pub fn of(source: impl std::fmt::Display, table: Table) -> Self {
+    pub fn from_table(source: impl std::fmt::Display, table: Table) -> Self {
         Document {
             source: source.to_string(),
             folder: PathBuf::new(),

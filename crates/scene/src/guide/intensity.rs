@@ -102,7 +102,7 @@ impl IntensityStereo {
 fn seen_from(scene: &Scene, from_m: DVec3) -> Scene {
     let mut moved = scene.clone();
     moved.rig.velocity_m_s = from_m;
-    moved.at(1.0)
+    moved.snapshot(1.0)
 }
 
 /// Whether the pattern about a pixel stands out of the counts' noise, whose standard deviation is ½ after the root.
@@ -175,7 +175,7 @@ impl Guide for IntensityStereo {
             let within = |at: u32| (at * self.finer..(at + 1) * self.finer).map(|at| at as usize);
             let pixels = within(row).flat_map(|row| within(col).map(move |col| (row, col)));
             let samples = pixels.filter_map(|(y, x)| {
-                let disparity_px = f64::from(found.at(y, x)?);
+                let disparity_px = f64::from(found.disparity_px(y, x)?);
                 let at = [x as f64 + 0.5, y as f64 + 0.5];
                 let metre_pixels = metre_pixels * lidar.at_unit_depth((at[0], at[1])).length();
                 let off = |axis: usize, first: u32| at[axis] / finer - f64::from(first) - 0.5;

@@ -29,7 +29,7 @@ pub struct Kind {
 
 impl Kind {
     /// A guide that is its own settings.
-    const fn of<G: Guide + Settings + 'static>(name: &'static str, what: &'static str) -> Self {
+    const fn new<G: Guide + Settings + 'static>(name: &'static str, what: &'static str) -> Self {
         Kind {
             name,
             what,
@@ -47,7 +47,7 @@ pub const KINDS: &[Kind] = &[
         keys: Nothing::KEYS,
         make: |document| read::<Nothing>(document).map(|_| Arc::new(BehaviouralStereo) as _),
     },
-    Kind::of::<NoisyTruth>("truth", "The true distance with a Gaussian error"),
+    Kind::new::<NoisyTruth>("truth", "The true distance with a Gaussian error"),
     Kind {
         make: |document| {
             let guide: MatchedStereo = read(document)?;
@@ -56,18 +56,18 @@ pub const KINDS: &[Kind] = &[
                 .map_err(|message| document.refuse("paths", message))?;
             Ok(Arc::new(guide))
         },
-        ..Kind::of::<MatchedStereo>(
+        ..Kind::new::<MatchedStereo>(
             "matched",
             "The scene's camera pair: images are rendered and matched",
         )
     },
-    Kind::of::<Monocular>(
+    Kind::new::<Monocular>(
         "monocular",
         "Depth from one image: everywhere, but with large errors",
     ),
-    Kind::of::<Radar>("radar", "Good range, coarse angle"),
-    Kind::of::<IntensityStereo>("intensity", "The intensity images of two lidars, matched"),
-    Kind::of::<Kalman>(
+    Kind::new::<Radar>("radar", "Good range, coarse angle"),
+    Kind::new::<IntensityStereo>("intensity", "The intensity images of two lidars, matched"),
+    Kind::new::<Kalman>(
         "kalman",
         "Prediction from earlier frames; has no estimate in the first",
     ),
@@ -130,7 +130,7 @@ pub fn parse(text: &str, source: &str) -> Result<Arc<dyn Guide>, InputError> {
         return Err(InputError::new(source, message));
     };
     let option = format!("{source} {text}");
-    let mut document = Document::of(&option, Table::new());
+    let mut document = Document::from_table(&option, Table::new());
     for assignment in settings.split(',').filter(|part| !part.is_empty()) {
         document.assign(assignment, &option)?;
     }

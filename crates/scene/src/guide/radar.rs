@@ -179,7 +179,7 @@ impl Guide for Radar {
         let mut each = beams.clone();
         each.sort_unstable();
         each.dedup();
-        let stage = Stage::of(input.scene);
+        let stage = Stage::new(input.scene);
         let found: Vec<Option<(f64, f64)>> = (0..each.len() as u32)
             .into_par_iter()
             .map(|number| {
@@ -230,7 +230,7 @@ mod tests {
         let radar = Radar::default();
         let scene = wall_at(50.0);
         for beam in [(0, 0), (3, -1), (-2, 2)] {
-            let echoes = radar.echoes(&Stage::of(&scene), beam);
+            let echoes = radar.echoes(&Stage::new(&scene), beam);
             assert_eq!(echoes.len() as u32, RAYS_ACROSS * RAYS_ACROSS);
             // A wall is met at 50 m over the cosine of the angle off the axis; so are all rays of the beam's grid.
             let angle = |beam: i32, n: u32, width_deg: f64| {

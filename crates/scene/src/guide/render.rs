@@ -140,13 +140,13 @@ fn radiances(
         .iter()
         .any(|o| o.transmittance > 0.0 || o.mirror > 0.0);
     let (width, height) = (crop.width as usize, crop.height as usize);
-    let bounds = Bounds::of(scene, ray(crop.middle(0, 0)).origin);
-    let stage = Stage::of(scene);
+    let bounds = Bounds::from_scene(scene, ray(crop.middle(0, 0)).origin);
+    let stage = Stage::new(scene);
     let radiance = |ray: &Ray, candidates: &_| {
         if !has_panes {
             match stage.hit_of(ray, candidates) {
                 Some(hit) => {
-                    let seen = surface(&stage, ray.at(hit.range_m), &hit, grain, pixel_rad);
+                    let seen = surface(&stage, ray.point(hit.range_m), &hit, grain, pixel_rad);
                     seen + air(&stage, hit.range_m)
                 }
                 None => SKY_REFLECTIVITY,
@@ -413,7 +413,7 @@ mod tests {
                     (f64::from(fog[pixel]) / wanted - 1.0).abs() < 1e-5,
                     "{pixel}"
                 );
-                let grain = grain_at(ray.at(hit.range_m), 2.0 / camera.focal_px * hit.range_m);
+                let grain = grain_at(ray.point(hit.range_m), 2.0 / camera.focal_px * hit.range_m);
                 let wanted = clear * (1.0 + 0.4 * grain).max(0.0);
                 assert!(
                     (f64::from(grainy[pixel]) - wanted).abs() < 1e-5,

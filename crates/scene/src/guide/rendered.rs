@@ -147,7 +147,7 @@ impl MatchedStereo {
         let mut points = Vec::with_capacity(map.matched());
         for row in 0..map.height() {
             for col in 0..map.width() {
-                let Some(binned_px) = map.at(row, col) else {
+                let Some(binned_px) = map.disparity_px(row, col) else {
                     continue;
                 };
                 let disparity_px = f64::from(binned_px) * f64::from(crop.binning);
@@ -178,7 +178,8 @@ impl MatchedStereo {
 fn answered(map: &DisparityMap) -> Vec<f64> {
     let (width, height) = (map.width(), map.height());
     let about = |at: usize, size: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(size);
-    let has_answer = |row: usize, col: usize| f64::from(u8::from(map.at(row, col).is_some()));
+    let has_answer =
+        |row: usize, col: usize| f64::from(u8::from(map.disparity_px(row, col).is_some()));
     let mut of_rows = vec![0.0; width * height];
     for (at, share) in of_rows.iter_mut().enumerate() {
         let cols = about(at % width, width);

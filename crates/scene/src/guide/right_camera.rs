@@ -75,7 +75,7 @@ mod tests {
                 baseline_error_m: errors.3, focal_error_percent: errors.4, ..Stereo::default()
             };
             let right = RightCamera::new(&stereo);
-            let seen = right.sees_at(right.ray(at).at(range_m)).unwrap();
+            let seen = right.sees_at(right.ray(at).point(range_m)).unwrap();
             prop_assert!((seen.0 - at.0).hypot(seen.1 - at.1) < 1e-6);
         }
     }

@@ -51,7 +51,7 @@ impl<'a> StereoRig<'a> {
     /// The rig of `scene`; equal seeds give equal errors.
     pub fn new(scene: &'a Scene, seed: u64) -> Self {
         StereoRig {
-            stage: Stage::of(scene),
+            stage: Stage::new(scene),
             camera: scene.stereo.camera(),
             right: RightCamera::new(&scene.stereo),
             seed,
@@ -94,7 +94,7 @@ impl<'a> StereoRig<'a> {
     fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
         let stereo = &self.stage.scene.stereo;
         let ray = Ray::new(stereo.position_m, self.camera.at_unit_depth(at));
-        let point_m = ray.at(self.stage.range_to_hit(&ray)?);
+        let point_m = ray.point(self.stage.range_to_hit(&ray)?);
         Some(at.0 - self.seen_by_right_camera(point_m)?)
     }
 

@@ -99,7 +99,7 @@ impl Stage<'_> {
             let Some(hit) = self.hit(&look) else {
                 continue;
             };
-            let second_m = look.at(hit.range_m);
+            let second_m = look.point(hit.range_m);
             let lit_m = second_m.length();
             let incidence = -hit.normal.dot(second_m) / lit_m;
             let sent_j_sr = self.scene.sent_j_sr(camera, second_m);

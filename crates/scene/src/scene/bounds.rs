@@ -62,7 +62,7 @@ pub(crate) struct Bounds {
 
 impl Bounds {
     /// Those of a scene, from `place_m`; the lidar is at zero.
-    pub(crate) fn of(scene: &Scene, place_m: DVec3) -> Self {
+    pub(crate) fn from_scene(scene: &Scene, place_m: DVec3) -> Self {
         let disc = |(centre_m, radius_m): (DVec3, f64)| {
             let offset_m = centre_m - place_m;
             let away_m = offset_m.length();
@@ -171,8 +171,8 @@ mod tests {
             let mut scene = Scene::outdoor();
             scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
             let rays: Vec<Ray> = spread.iter().map(|beside| Ray::new(place_m, towards + *beside)).collect();
-            let candidates = Bounds::of(&scene, place_m).of_rays(&rays);
-            let stage = Stage::of(&scene);
+            let candidates = Bounds::from_scene(&scene, place_m).of_rays(&rays);
+            let stage = Stage::new(&scene);
             for ray in &rays {
                 prop_assert_eq!(scene.hit(ray), stage.hit_of(ray, &candidates));
             }
@@ -187,7 +187,7 @@ mod tests {
         ) {
             let mut scene = Scene::outdoor();
             scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
-            let stage = Stage::of(&scene);
+            let stage = Stage::new(&scene);
             for origin in from_m {
                 let ray = Ray::new(origin, towards);
                 let blocked = scene.objects.iter().any(|object| object.shape.intersect(&ray).is_some());
@@ -211,7 +211,7 @@ mod tests {
                     object
                 })
                 .collect();
-            let (stage, bounds) = (Stage::of(&scene), Bounds::of(&scene, DVec3::ZERO));
+            let (stage, bounds) = (Stage::new(&scene), Bounds::from_scene(&scene, DVec3::ZERO));
             let camera = scene.lidar_camera(6, 5);
             for (row, col) in (0..6).flat_map(|row| (0..5).map(move |col| (row, col))) {
                 let at = |du: f64, dv: f64| {
@@ -233,7 +233,7 @@ mod tests {
         let scene = Scene::outdoor();
         let truth = GroundTruth::render(&scene, 64, 64);
         let camera = scene.lidar_camera(64, 64);
-        let bounds = Bounds::of(&scene, DVec3::ZERO);
+        let bounds = Bounds::from_scene(&scene, DVec3::ZERO);
         let mut tried = 0;
         for pixel in 0..64 * 64u32 {
             let (row, col) = (f64::from(pixel / 64), f64::from(pixel % 64));

@@ -87,7 +87,7 @@ mod tests {
 
     /// Macropixels of HSLIDAR's array that see an object at a time, and how far it is.
     fn seen(scene: &str, object: &str, time_s: f64) -> (usize, f64) {
-        let scene = Scene::named(scene).unwrap().at(time_s);
+        let scene = Scene::named(scene).unwrap().snapshot(time_s);
         let truth = GroundTruth::render(&scene, 32, 64);
         let is_it = |index: &Option<usize>| index.is_some_and(|i| scene.objects[i].name == object);
         let ranges = truth.object.iter().zip(&truth.range_m);

@@ -35,7 +35,7 @@ pub(super) struct Bundle {
 
 impl Bundle {
     /// Where a look begins.
-    pub(super) fn of(look: DVec3) -> Self {
+    pub(super) fn new(look: DVec3) -> Self {
         let (right, down) = look.any_orthonormal_pair();
         let beside = [right, down].map(|turn| Beside {
             turn,

@@ -82,7 +82,7 @@ impl Scene {
     /// The nearest opaque surface along `ray`, as if panes were not there; `None` for the sky. Of two in the same place
     /// the one listed first in the scene counts.
     pub fn hit(&self, ray: &Ray) -> Option<Hit> {
-        Stage::of(self).hit(ray)
+        Stage::new(self).hit(ray)
     }
 
     /// All that sends light back along `ray`: panes themselves, what stands behind them, and what they mirror.
@@ -91,7 +91,7 @@ impl Scene {
     /// it as far behind it. A pane's thickness, and light that goes one way over a mirror and the other past it, are left out.
     #[cfg(test)]
     pub(crate) fn returns(&self, ray: &Ray) -> Returns {
-        let stage = Stage::of(self);
+        let stage = Stage::new(self);
         stage.followed(ray, stage.first_meeting(ray, stage.all()), None)
     }
 }
@@ -136,7 +136,7 @@ impl Default for Way {
 pub(super) type First = Option<(Meeting, usize)>;
 
 impl<'a> Stage<'a> {
-    pub fn of(scene: &'a Scene) -> Self {
+    pub fn new(scene: &'a Scene) -> Self {
         let shapes = || scene.objects.iter().map(|object| &object.shape);
         let retro = scene.objects.iter().map(|object| object.retro);
         Stage {
@@ -225,7 +225,7 @@ impl<'a> Stage<'a> {
         };
         let mut hit = self.seen_at(ray, (meeting, index));
         let object = &self.scene.objects[index];
-        let point = ray.at(hit.range_m);
+        let point = ray.point(hit.range_m);
         let bundle = way.bundle.map(|bundle| bundle.after(hit.range_m));
         hit.range_m += so_far_m;
         if hit.reflectivity > 0.0 || hit.grey > 0.0 || object.ends_rays() {
@@ -271,7 +271,7 @@ impl<'a> Stage<'a> {
         }
         if let Some(share) = thrown {
             let reflected = Ray::new(point, reflected(ray.direction, hit.normal));
-            let bundle = bundle.unwrap_or_else(|| Bundle::of(ray.direction).after(so_far_m));
+            let bundle = bundle.unwrap_or_else(|| Bundle::new(ray.direction).after(so_far_m));
             let placed = &self.placed[index];
             let outward = placed.normal_at(point, meeting.part);
             let bend = |step_m| placed.bend(meeting.part, step_m);
@@ -318,7 +318,7 @@ impl<'a> Stage<'a> {
     pub(super) fn seen_at(&self, ray: &Ray, (meeting, index): (Meeting, usize)) -> Hit {
         let Meeting { range_m, part } = meeting;
         let (object, placed) = (&self.scene.objects[index], &self.placed[index]);
-        let point = ray.at(range_m);
+        let point = ray.point(range_m);
         let normal = placed.normal_at(point, part);
         let (reflectivity, grey) = object.material_at(placed, point, part);
         Hit {

@@ -88,7 +88,7 @@ impl Curve {
     }
 
     /// Its value at `x`; beyond its ends `None`.
-    pub(crate) fn at(&self, x: f64) -> Option<f64> {
+    pub(crate) fn interpolate(&self, x: f64) -> Option<f64> {
         let (first, last) = self.ends();
         if !(first..=last).contains(&x) {
             return None;
@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn curves_are_linear_between_their_points_and_nothing_beyond() {
         let curve = Curve::new(&[[1.0, 0.0], [2.0, 1.0], [4.0, 0.5]]).unwrap();
-        let at = [0.9, 1.0, 1.25, 2.0, 3.0, 4.0, 4.1].map(|x| curve.at(x));
+        let at = [0.9, 1.0, 1.25, 2.0, 3.0, 4.0, 4.1].map(|x| curve.interpolate(x));
         let expected = [
             None,
             Some(0.0),

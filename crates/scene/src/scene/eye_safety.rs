@@ -139,7 +139,7 @@ impl Train {
 }
 
 impl Band {
-    fn of(wavelength_nm: f64) -> Option<Self> {
+    fn from_wavelength(wavelength_nm: f64) -> Option<Self> {
         match wavelength_nm {
             700.0..1050.0 => Some(Band::NearInfrared),
             1050.0..=1200.0 => Some(Band::Retina1050),
@@ -195,7 +195,7 @@ impl Emission {
 
     /// The same laser with `times` the energy in a pulse, and with other times.
     #[must_use]
-    pub fn with(self, times: f64, train: Train) -> Self {
+    pub fn scaled(self, times: f64, train: Train) -> Self {
         Emission {
             pulse_j: times * self.pulse_j,
             train,
@@ -205,7 +205,7 @@ impl Emission {
 
     /// The limit that is nearest; `None` at wavelengths that are not judged.
     pub fn beside_class_1(&self) -> Option<EyeSafety> {
-        let band = Band::of(self.wavelength_nm)?;
+        let band = Band::from_wavelength(self.wavelength_nm)?;
         let train = &self.train;
         let judged = |rule, within_s: f64, share: f64| {
             let pulses = train.within(within_s);

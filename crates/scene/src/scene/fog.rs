@@ -39,7 +39,7 @@ pub(super) type Ends = [(f64, f64)];
 
 impl Fog {
     /// Of the scene's medium; `None` if it sends nothing back.
-    pub(super) fn of(scene: &Scene, budget: &PhotonBudget) -> Option<Self> {
+    pub(super) fn from_scene(scene: &Scene, budget: &PhotonBudget) -> Option<Self> {
         let medium = &scene.medium;
         if medium.backscatter_1_m_sr() <= 0.0 {
             return None;
@@ -130,7 +130,7 @@ mod tests {
         let lights = |scene: &Scene| scene.pixel_light(&truth(scene));
         let [of_clear, of_fog] = [&clear, &foggy].map(lights);
         let budget = foggy.photon_budget(16, 16);
-        let glare = Fog::of(&foggy, &budget).unwrap();
+        let glare = Fog::from_scene(&foggy, &budget).unwrap();
         let truth = truth(&foggy);
         for pixel in 0..256 {
             let echoes = |light: &PixelLight| -> Vec<Echo> {
@@ -177,7 +177,7 @@ mod tests {
     fn early_light_follows_the_law_of_fog() {
         let scene = foggy();
         let budget = scene.photon_budget(64, 64);
-        let fog = Fog::of(&scene, &budget).unwrap();
+        let fog = Fog::from_scene(&scene, &budget).unwrap();
         let sigma = scene.pulse_sigma();
         let dim = PixelLight::background(1e6);
         let light = fog.onto(dim, &[(60.0, 1.0)], 1.0, sigma, 0.0);

@@ -62,7 +62,7 @@ impl Lidar {
         let of_wavelength = match &self.pde_curve {
             Measured::Word(_) => 1.0,
             Measured::Curve(curve) => {
-                let at = |nm| curve.at(nm).unwrap_or(0.0);
+                let at = |nm| curve.interpolate(nm).unwrap_or(0.0);
                 at(self.warm_wavelength_nm()) / at(self.wavelength_nm)
             }
         };
@@ -140,14 +140,14 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, Train};
 
-    fn at(celsius: f64) -> Lidar {
+    fn lidar_at(celsius: f64) -> Lidar {
         let keys = format!("[lidar]\ntemperature_c = {celsius}\ndark_count_hz = 2e4\n");
         Scene::parse("test", &keys).unwrap().lidar
     }
 
     #[test]
     fn nothing_changes_at_25_degrees() {
-        let (given, lidar) = (Lidar::default(), at(25.0));
+        let (given, lidar) = (Lidar::default(), lidar_at(25.0));
         assert_eq!(lidar.dark_counts_hz(), 2e4);
         assert_eq!(lidar.warm_pde(), given.pde);
         assert_eq!(lidar.warm_wavelength_nm(), given.wavelength_nm);
@@ -159,7 +159,7 @@ mod tests {
         let near = |value: f64, expected: f64| {
             assert!((value / expected - 1.0).abs() < 1e-9, "{value} {expected}");
         };
-        let hot = at(105.0);
+        let hot = lidar_at(105.0);
         // 80 K take 1.72 V of 3 V, of which 1 V loses a factor of 10^(1/3).
         let triggered = (1.0 - 10f64.powf(-(3.0 - 1.72) / 3.0)) / 0.9;
         near(hot.warm_pde(), 0.185 * triggered);
@@ -171,7 +171,7 @@ mod tests {
         // Generation doubles every 9.8 K.
         let steady = |celsius| Lidar {
             breakdown_drift_mv_k: 0.0,
-            ..at(celsius)
+            ..lidar_at(celsius)
         };
         let doubled = steady(34.8).dark_counts_hz() / steady(25.0).dark_counts_hz();
         assert!((doubled - 2.0).abs() < 0.02, "{doubled}");
@@ -179,7 +179,10 @@ mod tests {
 
     #[test]
     fn the_warmer_the_more_dark_counts_and_the_fewer_photons() {
-        let all: Vec<Lidar> = (-55..=125).step_by(5).map(|c| at(f64::from(c))).collect();
+        let all: Vec<Lidar> = (-55..=125)
+            .step_by(5)
+            .map(|c| lidar_at(f64::from(c)))
+            .collect();
         for pair in all.windows(2) {
             assert!(pair[1].dark_counts_hz() > pair[0].dark_counts_hz());
             assert!(pair[1].warm_pde() < pair[0].warm_pde());
@@ -187,7 +190,7 @@ mod tests {
         // Without any bias left there are neither.
         let dead = Lidar {
             breakdown_drift_mv_k: 1000.0,
-            ..at(60.0)
+            ..lidar_at(60.0)
         };
         assert_eq!((dead.dark_counts_hz(), dead.warm_pde()), (0.0, 0.0));
     }

@@ -77,7 +77,7 @@ impl Scene {
         let mut last: Option<(Scene, GroundTruth)> = None;
         for cycles in segments {
             let middle = 0.5 * (f64::from(cycles.start) + f64::from(cycles.end));
-            let world = self.at(middle * cycle_s);
+            let world = self.snapshot(middle * cycle_s);
             let before = last.as_ref().map(|(world, truth)| Before { world, truth });
             let (truth, _) = GroundTruth::render_after(&world, truth.rows, truth.cols, before);
             let light = seen.last().map(|(_, light)| light.as_slice());
@@ -196,7 +196,7 @@ impl Scene {
             falling = all.into_iter().map(Lit::Anew).collect();
         }
         let (sigma, resolution) = (self.pulse_sigma(), self.pulse_resolution());
-        let fog = Fog::of(self, &budget);
+        let fog = Fog::from_scene(self, &budget);
         let light = |(lit, (view, off_axis)): (Lit<'_>, (&Arc<View>, &OffAxis))| {
             let mut falling = match lit {
                 Lit::Anew(falling) => falling,

@@ -47,7 +47,7 @@ impl Lidar {
         match &self.filter {
             Measured::Curve(curve) => {
                 let cold_nm = wavelength_nm - self.filter_shift_nm();
-                Some(curve.at(cold_nm).unwrap_or(0.0))
+                Some(curve.interpolate(cold_nm).unwrap_or(0.0))
             }
             Measured::Word(word) => {
                 let filter = self.filter_of(word.shape()?);
@@ -66,8 +66,8 @@ impl Lidar {
         match &self.pde_curve {
             Measured::Word(PdeWord::Flat) => 1.0,
             Measured::Curve(curve) => {
-                let own = curve.at(self.warm_wavelength_nm()).unwrap_or(0.0);
-                curve.at(wavelength_nm).unwrap_or(0.0) / own
+                let own = curve.interpolate(self.warm_wavelength_nm()).unwrap_or(0.0);
+                curve.interpolate(wavelength_nm).unwrap_or(0.0) / own
             }
         }
     }
@@ -160,7 +160,7 @@ impl Lidar {
         if let Measured::Curve(curve) = &self.pde_curve
             && let Some(nm) = [self.wavelength_nm, nm]
                 .into_iter()
-                .find(|&nm| curve.at(nm).unwrap_or(0.0) <= 0.0)
+                .find(|&nm| curve.interpolate(nm).unwrap_or(0.0) <= 0.0)
         {
             let message = format!(
                 "pde_curve has no detection efficiency at the laser's {nm} nm; give a curve that does"
@@ -211,7 +211,9 @@ impl Lidar {
                     -std::f64::consts::LN_2 * half_widths * half_widths,
                 ))
             }
-            Measured::Curve(curve) => Some(curve.at(angle_rad.to_degrees()).unwrap_or(0.0)),
+            Measured::Curve(curve) => {
+                Some(curve.interpolate(angle_rad.to_degrees()).unwrap_or(0.0))
+            }
         }
     }
 
@@ -239,7 +241,9 @@ impl Lidar {
                 let [[_, middle], ..] = curve.points[..] else {
                     return Some(0.0);
                 };
-                let at = curve.at(libm::acos(cosine).to_degrees()).unwrap_or(0.0);
+                let at = curve
+                    .interpolate(libm::acos(cosine).to_degrees())
+                    .unwrap_or(0.0);
                 Some(at / middle.max(f64::MIN_POSITIVE))
             }
         }
@@ -315,7 +319,7 @@ impl Scene {
         let step_ns = (last - first) / (samples - 1) as f64;
         let at = |n: usize| {
             curve
-                .at((first + n as f64 * step_ns).min(last))
+                .interpolate((first + n as f64 * step_ns).min(last))
                 .unwrap_or(0.0)
         };
         let powers: Vec<f64> = (0..samples).map(at).collect();

@@ -102,7 +102,7 @@ pub(super) fn along<const N: usize>(
 
 impl Rig {
     /// Place in the world, m, and turn to the right, degrees.
-    pub(crate) fn at(&self, time_s: f64) -> (DVec3, f64) {
+    pub(crate) fn pose(&self, time_s: f64) -> (DVec3, f64) {
         let points = self.waypoints.iter().map(|&at| at.into());
         match along(points, time_s) {
             Some([_, x, y, z, yaw_deg]) => (DVec3::new(x, y, z), yaw_deg),

@@ -29,7 +29,7 @@ pub(super) const REFERENCE_C: f64 = 25.0;
 
 /// A world and the optics through which it is seen. By default there is nothing in it.
 ///
-/// What moves is described where it is at time 0; [`Scene::at`] gives the scene at other times.
+/// What moves is described where it is at time 0; [`Scene::snapshot`] gives the scene at other times.
 ///
 /// Read one with [`Scene::parse`] or [`Scene::load`], or take [`Scene::outdoor`]. After changing
 /// fields call [`Scene::validate`].

@@ -42,14 +42,14 @@ struct Halo {
 }
 
 impl Halo {
-    fn of(lidar: &Lidar, rows: usize, cols: usize) -> Self {
+    fn new(lidar: &Lidar, rows: usize, cols: usize) -> Self {
         let aspect = lidar.macropixel_aspect;
         let radius = lidar.stray_radius;
         let strength = |row: f64, col: f64| {
             let away = libm::hypot(row * aspect, col);
             match &lidar.stray {
                 Measured::Word(_) => libm::pow(1.0 + (away / radius).powi(2), -1.5),
-                Measured::Curve(curve) => curve.at(away).unwrap_or(0.0),
+                Measured::Curve(curve) => curve.interpolate(away).unwrap_or(0.0),
             }
         };
         let cells = (-SUMMED..=SUMMED)
@@ -110,7 +110,7 @@ struct Cells {
 }
 
 impl Cells {
-    fn of(falling: &[Falling], length_fs: f64) -> Self {
+    fn new(falling: &[Falling], length_fs: f64) -> Self {
         let by_number = |light: &Falling| {
             let mut sums = BTreeMap::<Cell, Moments>::new();
             let mut add = |(laser, surface), photons: f64, time_fs: f64, variance_fs2: f64| {
@@ -178,9 +178,9 @@ impl Cells {
 /// Light on all macropixels of a scene with what the lens scatters; dark counts do not come through it.
 pub(super) fn with_stray_light(scene: &Scene, falling: &[Falling], cols: usize) -> Vec<Falling> {
     let dark_hz = scene.dark_hz();
-    let halo = Halo::of(&scene.lidar, falling.len() / cols, cols);
+    let halo = Halo::new(&scene.lidar, falling.len() / cols, cols);
     let cell_fs = CELL * scene.pulse_resolution().as_fs() as f64;
-    let cells = Cells::of(falling, cell_fs.max(1.0));
+    let cells = Cells::new(falling, cell_fs.max(1.0));
     // Beyond surfaces that are seen, and those that throw light on them.
     let first_surface = 2 * scene.objects.len();
     let trains: Vec<&PulseTrain> = falling.iter().flat_map(|light| &light.trains).collect();

@@ -104,7 +104,7 @@ impl Picture {
             (first, (first + 1) % count, at - at.floor())
         };
         let ((left, right, to_right), (top, bottom, down)) = (cell(x, width), cell(y, height));
-        let value = |row, col| f64::from(self.raster.at(row, col));
+        let value = |row, col| f64::from(self.raster.value(row, col));
         let row = |row| value(row, left) * (1.0 - to_right) + value(row, right) * to_right;
         row(top) * (1.0 - down) + row(bottom) * down
     }

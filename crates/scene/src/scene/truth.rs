@@ -65,7 +65,7 @@ impl GroundTruth {
             Some((Moved::between(before.world, scene)?, before.truth))
         });
         let camera = scene.lidar_camera(rows, cols);
-        let (stage, bounds) = (Stage::of(scene), Bounds::of(scene, DVec3::ZERO));
+        let (stage, bounds) = (Stage::new(scene), Bounds::from_scene(scene, DVec3::ZERO));
         let place = |pixel: u32| (pixel / cols, pixel % cols);
         let deep_m = DEEP * scene.pulse_resolution().as_range_m();
         let is_kept = |pixel: u32| {
@@ -80,7 +80,7 @@ impl GroundTruth {
                 (before.views[pixel].clone(), before.surfaces[pixel].clone())
             }
             _ => {
-                let view = View::of(&stage, &bounds, &camera, place(pixel), deep_m);
+                let view = View::new(&stage, &bounds, &camera, place(pixel), deep_m);
                 let surfaces = view.surfaces(&scene.medium);
                 (Arc::new(view), surfaces)
             }

@@ -43,7 +43,7 @@ impl Moved {
         (!is_any || now.towards_sun().is_none()).then(|| Moved {
             is_moved,
             has_mirror: now.objects.iter().map(|o| o.mirror > 0.0).collect(),
-            bounds: [before, now].map(|world| Bounds::of(world, DVec3::ZERO)),
+            bounds: [before, now].map(|world| Bounds::from_scene(world, DVec3::ZERO)),
         })
     }
 

@@ -89,7 +89,7 @@ pub(super) struct View {
 
 impl View {
     /// What a macropixel, by row and column, sees. A surface is deep from `deep_m` on.
-    pub(super) fn of(
+    pub(super) fn new(
         stage: &Stage,
         bounds: &Bounds,
         camera: &PinholeCamera,
@@ -132,7 +132,7 @@ impl View {
             if !needs_more {
                 let piece = Piece::new(camera, RAYS);
                 for ((look, _), returns) in few.iter().zip(&all) {
-                    view.see(stage, &piece, look, &returns.surfaces, &returns.ends);
+                    view.add_ray(stage, &piece, look, &returns.surfaces, &returns.ends);
                 }
             }
             needs_more
@@ -145,7 +145,7 @@ impl View {
                     view.see_end(stage, &piece, &look, &first);
                 } else {
                     let returns = stage.returns_from(&look.ray, first, &candidates);
-                    view.see(stage, &piece, &look, &returns.surfaces, &returns.ends);
+                    view.add_ray(stage, &piece, &look, &returns.surfaces, &returns.ends);
                 }
             }
         }
@@ -167,23 +167,23 @@ impl View {
             }]
         };
         match first {
-            None => self.see(stage, piece, look, &[], &end(f64::INFINITY)),
+            None => self.add_ray(stage, piece, look, &[], &end(f64::INFINITY)),
             Some(first) => {
                 let hit = stage.seen_at(&look.ray, *first);
                 let surface = Return {
                     hit,
-                    place_m: look.ray.at(hit.range_m),
+                    place_m: look.ray.point(hit.range_m),
                     facing: hit.normal,
                     share: 1.0,
                     share_back: 1.0,
                 };
-                self.see(stage, piece, look, &[surface], &end(hit.range_m));
+                self.add_ray(stage, piece, look, &[surface], &end(hit.range_m));
             }
         }
     }
 
     /// Adds a ray with what sends light back along it, nearest first, and where its light ends.
-    fn see(
+    fn add_ray(
         &mut self,
         stage: &Stage,
         piece: &Piece,

@@ -35,7 +35,7 @@ impl DisparityMap {
     ///
     /// # Panics
     /// Outside the image.
-    pub(crate) fn at(&self, row: usize, col: usize) -> Option<f32> {
+    pub(crate) fn disparity_px(&self, row: usize, col: usize) -> Option<f32> {
         assert!(col < self.width, "column {col} of {}", self.width);
         let d = self.px[row * self.width + col];
         (!d.is_nan()).then_some(d)
@@ -167,6 +167,6 @@ mod tests {
         };
         map.keep(|at, px| at != 3 && px > 2.0);
         assert_eq!(map.matched(), 1);
-        assert_eq!(map.at(1, 0), Some(3.0));
+        assert_eq!(map.disparity_px(1, 0), Some(3.0));
     }
 }

@@ -71,7 +71,7 @@ impl Photons {
             return WORST_OF_16;
         }
         let settled = |photons: &Photons| {
-            let taken = take(config, silicon, limits, SLOW, photons);
+            let taken = simulate_photons(config, silicon, limits, SLOW, photons);
             taken.map_or(Time::ZERO, |taken| taken.settled)
         };
         let tried = (0..TRIED).map(|number| Photons::random(config.spads(), number));
@@ -93,13 +93,14 @@ pub struct CorrelationTiming {
 
 impl CorrelationTiming {
     /// Simulates the worst photons at a slow clock, and at ever shorter periods.
-    pub fn of(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
+    pub fn simulate(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
         let photons = &Photons::worst(config, silicon, limits);
-        let settled = take(config, silicon, limits, SLOW, photons);
+        let settled = simulate_photons(config, silicon, limits, SLOW, photons);
         CorrelationTiming {
             settled: settled.map_or(Time::MAX, |taken| taken.settled),
             period: shortest_period(SLOW, |period| {
-                take(config, silicon, limits, period, photons).is_some_and(|taken| taken.is_right)
+                simulate_photons(config, silicon, limits, period, photons)
+                    .is_some_and(|taken| taken.is_right)
             }),
         }
     }
@@ -110,7 +111,7 @@ struct Taken {
     is_right: bool,
 }
 
-fn take(
+fn simulate_photons(
     config: &SensorConfig,
     silicon: &Silicon,
     limits: Limits,

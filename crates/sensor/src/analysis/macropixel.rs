@@ -94,7 +94,7 @@ impl Aim {
 
 impl MacropixelTiming {
     /// Analyses the macropixel at `position` (row, column) of this sensor: mismatch differs from one to the next.
-    pub fn of(
+    pub fn analyse(
         config: &SensorConfig,
         silicon: &Silicon,
         limits: Limits,
@@ -105,8 +105,8 @@ impl MacropixelTiming {
         let timing = silicon.timing(&circuit.netlist);
         let (library, corner) = (silicon.limits(limits), silicon.corner);
         let paths = circuit.paths(&timing);
-        let delays = MacropixelDelays::of(&paths);
-        let counter = CounterDelays::of(&paths, &delays);
+        let delays = MacropixelDelays::measure(&paths);
+        let counter = CounterDelays::measure(&paths, &delays);
         let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, corner));
         let half_load_period = Time::from_fs(config.load_clock().period().as_fs() / 2);
         let (netlist, probes) = (&circuit.netlist, &circuit.probes);
@@ -115,7 +115,7 @@ impl MacropixelTiming {
         let (rise, fall) = (clk.arrivals(Edge::Rise), clk.arrivals(Edge::Fall));
 
         // Which CLK edge takes START is the window law's to say, in the library's delays.
-        let is_library = *silicon == Silicon::of(config);
+        let is_library = *silicon == Silicon::new(config);
         let (hits, clk_rest) = circuit.split(clk.all(), !is_library);
         let limit = |kind: CheckKind| {
             let limits = library.checks(CellKind::Dffr);
@@ -384,7 +384,7 @@ pub struct LocalClocks {
 
 impl LocalClocks {
     /// Analyses macropixel (0, 0), limits kept.
-    pub fn of(config: &SensorConfig, silicon: &Silicon) -> Self {
+    pub fn analyse(config: &SensorConfig, silicon: &Silicon) -> Self {
         let circuit = MacropixelCircuit::new(config, (0, 0));
         let (netlist, probes) = (&circuit.netlist, &circuit.probes);
         let timing = silicon.timing(netlist);

@@ -140,7 +140,7 @@ pub struct BlockSilicon {
 impl MacropixelPower {
     /// Simulates macropixel (0, 0) with this start value and these SPAD pulses at gate level, and charges what toggles from
     /// the first STOP edge on.
-    pub fn of(
+    pub fn simulate(
         config: &SensorConfig,
         exposure: &Exposure,
         start: u16,
@@ -163,7 +163,7 @@ impl MacropixelPower {
         let outputs = scopes.flat_map(|scope| netlist.cells_of(scope));
         let outputs = outputs.flat_map(|cell| netlist.cells()[cell].output_nets());
         let toggles: u64 = outputs.map(|net| nets[net.index()].toggles).sum();
-        let library = CellLibrary::of(config)
+        let library = CellLibrary::from_config(config)
             .ok()
             .and_then(CellLibrary::from_file);
         let silicon = library.map(|library| {

@@ -118,15 +118,15 @@ impl VerdictReport {
 
 impl TimingVerdict {
     /// Judges the sensor at its CLK, STOP phase, LOAD_CLK and dead time; where macropixels differ, the one at `position`.
-    pub fn of(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
+    pub fn analyse(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
         let (period, phase) = (config.clock().period(), config.stop_phase());
-        let pixel = MacropixelTiming::of(config, silicon, Limits::Kept, position);
-        let library = Silicon::of(config);
+        let pixel = MacropixelTiming::analyse(config, silicon, Limits::Kept, position);
+        let library = Silicon::new(config);
         let is_library = *silicon == library;
         let aim = if is_library {
             pixel.aim(period, phase)
         } else {
-            MacropixelTiming::of(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
+            MacropixelTiming::analyse(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
         };
         let mut margins = pixel_margins(&pixel, period, phase, aim);
         margins.extend(local_margins(config, silicon));
@@ -292,7 +292,7 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
 
 /// Margins of flip-flops with clocks of their own.
 fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
-    let local = LocalClocks::of(config, silicon);
+    let local = LocalClocks::analyse(config, silicon);
     let width = config.pulse_width();
     let mut margins = tightest(
         "SPAD_RAW",
@@ -327,7 +327,7 @@ fn load_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
         rows: config.rows.min(LOADED_ROWS),
         ..config.clone()
     };
-    let load = LoadTiming::of(&rows, silicon, Limits::Kept);
+    let load = LoadTiming::analyse(&rows, silicon, Limits::Kept);
     let period = config.load_clock().period();
     let mut margins = tightest(
         "LOAD_CLK",

@@ -247,7 +247,7 @@ impl SensorConfig {
             *file = library_setting(files.map(|file| placed(&document.folder, &file)));
         }
         // A library that cannot be read is complained of below.
-        let library = CellLibrary::of(&config).ok();
+        let library = CellLibrary::from_config(&config).ok();
         let library = library.and_then(CellLibrary::from_file);
         let library = library.map(|read| &read.liberty);
         for contract in &CONTRACTS {
@@ -377,13 +377,13 @@ impl SensorConfig {
                 SensorFault::Value { key, why }
             })?;
         }
-        let library =
-            CellLibrary::of(self).map_err(|(key, why)| SensorFault::Liberty { key, why })?;
+        let library = CellLibrary::from_config(self)
+            .map_err(|(key, why)| SensorFault::Liberty { key, why })?;
         Silicon::at_temperature(library, self).map_err(|why| SensorFault::Liberty {
             key: "temperature_c",
             why: why.to_string(),
         })?;
-        ChipTiming::of(self).pulses.follow(self)?;
+        ChipTiming::new(self).pulses.follow(self)?;
         let half_period_ps = 0.5e12 / self.clk_hz;
         if self.stop_phase_ps.is_nan() || self.stop_phase_ps.abs() > half_period_ps {
             return Err(SensorFault::StopPhase {

@@ -251,7 +251,7 @@ fn whole_pixels<E: Replay + ?Sized>(
         .collect();
     let histograms = engine.replay(&pulsed)?;
     let config = stream.config();
-    let cancelling = Cancelling::of(config.spads.shortest_dead_time(), config.clock, || {
+    let cancelling = Cancelling::from_law(config.spads.shortest_dead_time(), config.clock, || {
         engine.law()
     });
     let cancelled = cancelling.map_or(0, |cancelling| {

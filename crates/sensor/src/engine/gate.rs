@@ -159,7 +159,7 @@ impl GateSimulation {
 
     /// Simulates from power-up to `until`.
     pub(super) fn run_until(&mut self, until: Time, observer: &mut dyn Observer) {
-        let pins = SensorPins::of(&self.netlist);
+        let pins = SensorPins::find(&self.netlist);
         let mut stimulus = self.plan.stimulus(&pins);
         if let Some((rest, states)) = self.preset.take() {
             self.kernel
@@ -193,11 +193,11 @@ impl GateSimulation {
             Some(stream) => {
                 let clock = self.sensor.load_clock();
                 let times = (now, now + clock.period());
-                reload_stimulus(LoadPins::of(&self.netlist), clock, times, stream)
+                reload_stimulus(LoadPins::find(&self.netlist), clock, times, stream)
             }
         };
         let order = self.plan.order;
-        let pins = ReadPins::of(&self.netlist);
+        let pins = ReadPins::find(&self.netlist);
         let (clock, start) = (self.sensor.read_clock(), self.kernel.now());
         let (end, read) = read_stimulus(&pins, clock, start, order.periods());
         let mut stimulus = read.with_drives(others);

@@ -83,7 +83,7 @@ impl LaneSimulation {
 
     /// Simulates from power-up to `end`, in simulation time.
     pub(super) fn run_until<O: LaneObserver>(&mut self, end: Time, observer: &mut O) {
-        let pins = SensorPins::of(&self.netlist);
+        let pins = SensorPins::find(&self.netlist);
         let mut stimulus = self.stimulus(&pins).peekable();
         self.kernel
             .run(&mut stimulus, end, observer)

@@ -322,7 +322,7 @@ pub fn write_waves(
     run: impl FnOnce(&mut WaveFile) -> Time,
 ) -> Result<(), InputError> {
     let all = Time::ZERO..=Time::MAX;
-    let format = WaveFormat::of(waves);
+    let format = WaveFormat::from_path(waves);
     let mut file = WaveFile::create(waves, format, netlist, &Selection::all(), all)?;
     let end = run(&mut file);
     file.finish(end)?;

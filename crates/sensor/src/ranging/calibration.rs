@@ -83,7 +83,7 @@ impl Calibration {
                 return Err(CalibrationError::TooFew(zone));
             };
             for ((&x, &n), &depth) in arrivals.iter().zip(&counts).zip(&depths) {
-                let (n, depth) = (n - of_counts.at(x), depth - of_depths.at(x));
+                let (n, depth) = (n - of_counts.value(x), depth - of_depths.value(x));
                 covariance += n * depth;
                 variance += n * n;
             }
@@ -104,7 +104,7 @@ impl Calibration {
                 Line::through(&arrivals, &without_walk).ok_or(CalibrationError::TooFew(zone))?;
             Ok(ZoneCalibration {
                 scale_m: line.slope,
-                offset_m: line.at(0.0),
+                offset_m: line.value(0.0),
             })
         });
         Ok(Calibration {
@@ -157,7 +157,7 @@ impl Line {
         })
     }
 
-    fn at(&self, x: f64) -> f64 {
+    fn value(&self, x: f64) -> f64 {
         self.mean_y + self.slope * (x - self.mean_x)
     }
 }

@@ -300,7 +300,7 @@ impl EchoFinder {
             ln_false_alarm: self.ln_false_alarm,
         };
         let own = search.extent(peak.peak_bin);
-        search.take(own.clone());
+        search.mark_bins(own.clone());
         if let (Some(walk), Some(light)) = (walk, light) {
             let cycles = f64::from(walk.laser_cycles);
             let chances = walk.response.chances(&light);
@@ -308,7 +308,7 @@ impl EchoFinder {
             let half = 3.0 * light.sigma_bins + 0.5;
             let ends =
                 [-half, half].map(|off| (light.position_bins + off).round().max(0.0) as usize);
-            search.take(ends[0]..ends[1] + 1);
+            search.mark_bins(ends[0]..ends[1] + 1);
         } else {
             let outside = counts
                 .iter()

@@ -63,7 +63,7 @@ pub(super) struct Steps {
 
 impl Steps {
     /// Those of `bins` bins: `steps` in each with light of a pulse, and in each where SPADs recover from it a dead time of `dead` bins later.
-    pub(super) fn of(
+    pub(super) fn for_pulses(
         first_bin: f64,
         bins: usize,
         pulses: &[Pulse],

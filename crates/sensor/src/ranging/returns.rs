@@ -99,7 +99,7 @@ impl Search<'_> {
     }
 
     /// Marks bins as those of a known echo.
-    pub(super) fn take(&mut self, bins: Range<usize>) {
+    pub(super) fn mark_bins(&mut self, bins: Range<usize>) {
         let end = bins.end.min(self.taken.len());
         let first = bins.start.min(end);
         self.taken[first..end].fill(true);
@@ -123,7 +123,7 @@ impl Search<'_> {
             let found = self.extent(peak_bin);
             let found = found.start.min(first)..found.end.max(first + self.width);
             let is_flank = self.is_flank(peak_bin);
-            self.take(found.clone());
+            self.mark_bins(found.clone());
             if !is_flank {
                 return Some(Found {
                     bins: found,
@@ -166,7 +166,7 @@ mod tests {
             width: 2,
             ln_false_alarm: libm::log(1e-3),
         };
-        search.take(taken);
+        search.mark_bins(taken);
         search
     }
 

@@ -201,7 +201,7 @@ impl StimulusPlan {
             pulses: all,
             schedule,
             skip: None,
-            order: ReadoutOrder::of(&SensorConfig {
+            order: ReadoutOrder::new(&SensorConfig {
                 rows: starts.len() / cols,
                 cols,
                 ..(*sensor).clone()

@@ -87,7 +87,7 @@ impl Recording {
     ///
     /// # Panics
     /// When the array has no such macropixel.
-    pub fn of(
+    pub fn from_events(
         events: impl IntoIterator<Item = (usize, SpadEvent)>,
         config: &SensorConfig,
         exposure: &Exposure,
@@ -284,7 +284,7 @@ mod tests {
             let time = Time::from_fs(fs);
             (pixel, SpadEvent { time, spad })
         });
-        assert_eq!(Recording::of(events, &config(), &exposure()), read);
+        assert_eq!(Recording::from_events(events, &config(), &exposure()), read);
         assert_eq!((read.lost_to_dead_time, read.after_the_end), (1, 1));
     }
 

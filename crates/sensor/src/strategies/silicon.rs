@@ -58,7 +58,7 @@ pub fn mismatches() -> impl Strategy<Value = Mismatch> + Clone {
 ///
 /// The sensor must have passed [`SensorConfig::check`]. Shrinks towards its own silicon.
 pub fn silicon(config: &SensorConfig) -> impl Strategy<Value = Silicon> + Clone + use<> {
-    let own = Silicon::of(config);
+    let own = Silicon::new(config);
     let conditions = proptest::option::weighted(0.7, conditions());
     let mismatch = proptest::option::weighted(0.3, mismatches());
     (conditions, mismatch).prop_map(move |(conditions, mismatch)| {

@@ -158,7 +158,7 @@ impl Chip<'_> {
         let most = (1 << self.sensor.bin_bits) - 1;
         let full = frames.iter().filter(|frame| frame.counts.contains(&most));
         Ok(Taken {
-            measurement: Measurement::of(&errors, cycles, wanted_ns(self.system)),
+            measurement: Measurement::from_errors(&errors, cycles, wanted_ns(self.system)),
             full: full.count() as u32,
         })
     }

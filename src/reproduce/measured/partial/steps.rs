@@ -65,7 +65,7 @@ pub(crate) struct Measurement {
 
 impl Measurement {
     /// From the errors of frames of `cycles` laser cycles, ns, and the spread that is wanted, ns.
-    pub(super) fn of(errors_ns: &[f64], cycles: u32, wanted_ns: f64) -> Self {
+    pub(super) fn from_errors(errors_ns: &[f64], cycles: u32, wanted_ns: f64) -> Self {
         let of_the_echo = errors_ns
             .iter()
             .filter(|e| e.abs() <= OF_THE_ECHO * wanted_ns);
@@ -115,9 +115,9 @@ pub(super) fn measuring(
         echo_bins: f64::from(system.bins / 2),
         ..lit(system, sensor, step.range_m, cycles)
     };
-    let trial = trial.on(|sensor| sensor.clk_hz = 1.0 / system.bin_s);
+    let trial = trial.with_sensor_change(|sensor| sensor.clk_hz = 1.0 / system.bin_s);
     let all = errors_ns(&trial, frames, seed(step) + 1, Estimator::Likelihood)?;
-    Ok(Measurement::of(&all, cycles, wanted_ns))
+    Ok(Measurement::from_errors(&all, cycles, wanted_ns))
 }
 
 /// A detection on the chip with a slow CLK, in the conventional mode; `None` for a step that is none.

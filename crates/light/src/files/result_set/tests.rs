@@ -55,7 +55,7 @@ fn a_set_replaces_the_one_before_it() {
     assert_eq!(listing(&out), owned(&expected));
     let manifest = Manifest::read(&out).unwrap();
     assert!(manifest.complete);
-    let known = ManifestFile::of(&out, "a").unwrap();
+    let known = ManifestFile::from_file(&out, "a").unwrap();
     assert_eq!(manifest.files[0], known);
     // sha256sum of "2".
     assert_eq!(
@@ -125,7 +125,7 @@ fn a_switch_that_was_killed_says_so_and_is_put_right_by_the_next() {
     manifest.complete = false;
     manifest.previous_files = std::mem::take(&mut manifest.files);
     fs::write(out.join("a"), "new a").unwrap();
-    manifest.files = vec![ManifestFile::of(out, "a").unwrap()];
+    manifest.files = vec![ManifestFile::from_file(out, "a").unwrap()];
     manifest.write(&out.join(MANIFEST)).unwrap();
 
     assert!(put(out, &[("a", "newer a"), ("b", "newer b")]).is_empty());

@@ -222,7 +222,7 @@ impl<'a> PixelStream<'a> {
     pub fn block_at(&self, time_fs: i64) -> u32 {
         let ends_fs = self.stream.ends_fs();
         let slots = self.stream.slots;
-        let slot = slots.at(time_fs.clamp(ends_fs.start, ends_fs.end - 1));
+        let slot = slots.slot_at(time_fs.clamp(ends_fs.start, ends_fs.end - 1));
         slot.min(slots.count - 1) / BLOCK_SLOTS
     }
 

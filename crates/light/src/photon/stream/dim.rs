@@ -35,8 +35,8 @@ impl PixelStream<'_> {
             return;
         }
         draw.within_fs = span.within_fs.clone();
-        let (background, parts) = self.background.of(group);
-        let (signal, signal_parts) = self.signal.of(group);
+        let (background, parts) = self.background.distribution(group);
+        let (signal, signal_parts) = self.signal.distribution(group);
         let has_echo = !signal.is_zero()
             && !draw.within_fs.is_empty()
             && self.echo_fs.0 < draw.within_fs.end
@@ -210,7 +210,7 @@ impl ByCycle {
         }
     }
 
-    pub(in crate::photon) fn of(&self, cycle: u32) -> &[i64] {
+    pub(in crate::photon) fn cycle_photons(&self, cycle: u32) -> &[i64] {
         let cycle = cycle as usize;
         let start = cycle.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.photons[start..self.ends[cycle]]

@@ -24,7 +24,7 @@ pub(super) struct Limits {
 
 impl Limits {
     /// Those of a layer; `None` if all of it is kept.
-    pub(super) fn of(layer: &Layer<'_>, stream: &PhotonStream) -> Option<Self> {
+    pub(super) fn from_layer(layer: &Layer<'_>, stream: &PhotonStream) -> Option<Self> {
         let laser_cycles = stream.config.laser_cycles;
         let cycles = layer.cycles.start.min(laser_cycles)..layer.cycles.end.min(laser_cycles);
         let has_energies = stream.config.energy_spread > 0.0

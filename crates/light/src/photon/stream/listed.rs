@@ -41,7 +41,7 @@ impl ListedEchoes {
 
     /// The photons of one laser cycle's echo of `light`, in no particular order, where they do not depend on the SPADs' states; those
     /// before or after the exposure are none.
-    pub fn of(&mut self, light: &PixelStream<'_>, cycle: u32) -> &[Photon] {
+    pub fn photons(&mut self, light: &PixelStream<'_>, cycle: u32) -> &[Photon] {
         if !light.has_listed_echo() {
             return &[];
         }
@@ -208,7 +208,7 @@ mod tests {
             for part in stream.parts(pixel, &light) {
                 let mut listed = ListedEchoes::default();
                 for &cycle in &asked {
-                    prop_assert_eq!(listed.of(&part, cycle), &one_by_one(&part, cycle)[..]);
+                    prop_assert_eq!(listed.photons(&part, cycle), &one_by_one(&part, cycle)[..]);
                 }
             }
         }

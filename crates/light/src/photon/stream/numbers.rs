@@ -63,7 +63,7 @@ impl Numbers {
     }
 
     /// A distribution, and how many draws of it make the number in this group.
-    pub(super) fn of(&self, group: Group) -> (&Poisson, u32) {
+    pub(super) fn distribution(&self, group: Group) -> (&Poisson, u32) {
         let (cell, cycles) = if group.cycles() == group.longest() {
             (&self.long, group.longest())
         } else {

@@ -139,7 +139,7 @@ impl PhotonStream {
         let photons = layer.signal_per_cycle * greatest_energy * share;
         let foreign = layer
             .train
-            .map(|train| Foreign::of(train, self, photons, reach_fs));
+            .map(|train| Foreign::new(train, self, photons, reach_fs));
         let per_spad = match foreign {
             Some(_) => 0.0,
             None => photons / self.spads() as f64,
@@ -162,7 +162,7 @@ impl PhotonStream {
             kind,
             is_bright: false,
             is_alone: true,
-            limits: Limits::of(layer, self),
+            limits: Limits::from_layer(layer, self),
             gaussian,
             shape,
             foreign,

@@ -40,7 +40,7 @@ fn limits_of_the_retina_are_exposure_limits_times_the_pupil() {
         let c4 = 10f64.powf(0.002 * (nm - 700.0));
         let limit = |mrad, time_s| {
             let light = wider(emission(nm, 1e-9), mrad);
-            light.limit_j(Band::of(nm).unwrap(), time_s)
+            light.limit_j(Band::from_wavelength(nm).unwrap(), time_s)
         };
         within(limit(1.5, 1e-6), 2e-3 * c4 * pupil_m2, 0.01);
         within(limit(3.0, 1e-6), 4e-3 * c4 * pupil_m2, 0.01);
@@ -54,7 +54,7 @@ fn limits_of_the_retina_are_exposure_limits_times_the_pupil() {
         within(limit(1.500_001, 100.0), of_10_s * 100.0, 0.02);
     }
     for (nm, c7) in [(1050.0, 1.0), (1064.0, 1.0), (1150.0, 1.0), (1175.0, 2.818)] {
-        let limit = |time_s| emission(nm, 1e-9).limit_j(Band::of(nm).unwrap(), time_s);
+        let limit = |time_s| emission(nm, 1e-9).limit_j(Band::from_wavelength(nm).unwrap(), time_s);
         within(limit(1e-6), 2e-2 * c7 * pupil_m2, 0.01);
         within(limit(0.3), 90.0 * c7 * 0.3f64.powf(0.75) * pupil_m2, 0.02);
         within(limit(100.0), 50.0 * 100.0 * c7 * pupil_m2, 0.02);
@@ -65,7 +65,7 @@ fn limits_of_the_retina_are_exposure_limits_times_the_pupil() {
 #[test]
 fn limits_of_the_cornea_are_exposure_limits_times_the_aperture() {
     for time_s in [1e-9, 1e-3, 0.3, 0.4, 1.0, 9.0, 10.0, 40.0, 100.0] {
-        let band = Band::of(1550.0).unwrap();
+        let band = Band::from_wavelength(1550.0).unwrap();
         let radius_m = 0.5 * band.aperture_m(time_s);
         let exposure = 1e4 * f64::max(1.0, time_s / 10.0);
         let expected_j = exposure * PI * radius_m * radius_m;
@@ -80,7 +80,7 @@ fn limits_of_the_cornea_are_exposure_limits_times_the_aperture() {
         ..emission(1550.0, 1e-3)
     };
     // A narrow beam is collected whole, a wide one by 1 mm at 100 mm.
-    let narrow = beam(1e9).with(1e-2, steady(100.0));
+    let narrow = beam(1e9).scaled(1e-2, steady(100.0));
     within(judged(narrow).times_class_1, 1e-3 / 1e-2, 2e-3);
     let wide = Emission {
         train: Train {
@@ -115,11 +115,11 @@ fn the_strictest_rule_decides() {
     };
     assert_eq!(judged(alone).rule, EyeRule::SinglePulse);
     // 10 000 pulses a second within 10 s: C5 is at its least.
-    let train = emission(905.0, 2e-9).with(1.0, steady(1e4));
+    let train = emission(905.0, 2e-9).scaled(1.0, steady(1e4));
     within(judged(train).times_class_1, 2e-9 / (0.4 * 0.198e-6), 0.01);
     assert_eq!(judged(train).rule, EyeRule::PulseTrain);
     // At 1 MHz six pulses come within 5 us, and the mean is 2 mW.
-    let fast = train.with(1.0, steady(1e6));
+    let fast = train.scaled(1.0, steady(1e6));
     assert_eq!(judged(fast).rule, EyeRule::Average);
     within(judged(fast).times_class_1, 2e-3 / 1.003e-3, 0.01);
     // A source of 10 mm may have as much on average as 66.7 points, for 100 s instead of 10; of its pulses a 400th counts.
@@ -137,7 +137,7 @@ fn pulses_of_a_wide_source_may_have_as_much_as_its_area() {
             frame_s: 1e3,
             ..steady(1.0)
         };
-        let pulse = wider(emission(905.0, 1e-7), mrad).with(1.0, alone);
+        let pulse = wider(emission(905.0, 1e-7), mrad).scaled(1.0, alone);
         let allowed = 0.198e-6 * mrad * mrad / (1.5 * 5.0);
         within(judged(pulse).times_class_1, 1e-7 / allowed, 0.01);
     }
@@ -151,7 +151,7 @@ fn bursts_are_judged_within_their_own_time() {
         pulses: 30_319.0,
         frame_s: 2.0,
     };
-    let burst = judged(emission(940.0, 73.5e-9).with(1.0, train));
+    let burst = judged(emission(940.0, 73.5e-9).scaled(1.0, train));
     assert_eq!(burst.rule, EyeRule::Average);
     within(burst.within_s, 30_318.0 / 50e3, 1e-6);
     let allowed_j = 7e-4 * 10f64.powf(0.48) * 0.606_36f64.powf(0.75);
@@ -172,8 +172,8 @@ proptest! {
         let pulses = 10f64.powf(log_pulses).floor();
         let train = Train { rate_hz, pulses, frame_s: gap * pulses / rate_hz };
         let light = Emission { per_sr: 3.0, ..emission(nm, 1e-7) };
-        let light = wider(light, mrad).with(1.0, train);
-        let band = Band::of(nm).unwrap();
+        let light = wider(light, mrad).scaled(1.0, train);
+        let band = Band::from_wavelength(nm).unwrap();
         let mut most = 0f64;
         let mut time_s = band.one_pulse_s();
         while time_s <= TIME_BASE_S {
@@ -204,7 +204,7 @@ fn a_published_example_is_met() {
     let (power_w, rate_hz, pupil_m2) = (0.124, 80.1e6, PI * 3.5e-3 * 3.5e-3);
     let point = Emission {
         per_sr: 1.0 / (4.0 * PI),
-        ..emission(784.0, power_w / rate_hz).with(1.0, steady(rate_hz))
+        ..emission(784.0, power_w / rate_hz).scaled(1.0, steady(rate_hz))
     };
     let wide = wider(point, 2.0 / 0.101);
     within(

@@ -150,7 +150,7 @@ fn what_moves_has_light_of_segments_and_the_rest_has_not() {
         .position(|o| o.name == "truck")
         .unwrap();
     scene.objects[truck].velocity_m_s = DVec3::new(0.0, 0.0, -15.0);
-    let truth = GroundTruth::render(&scene.at(0.1), 32, 32);
+    let truth = GroundTruth::render(&scene.snapshot(0.1), 32, 32);
     let moving = scene.light_during(&truth, &spads, 16_000, 12.5e-6);
     let mut seen = 0;
     for (pixel, (a, b)) in still.iter().zip(&moving).enumerate() {

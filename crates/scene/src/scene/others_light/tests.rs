@@ -280,7 +280,7 @@ fn what_cannot_be_is_refused_in_one_sentence() {
 fn another_lidar_moves_with_the_world() {
     let mut scene = before_a_wall(0.3, "place_m = [0, 0, 30]\nvelocity_m_s = [1, 0, -10]");
     scene.rig.yaw_rate_deg_s = 30.0;
-    let later = &scene.at(3.0).interferers[0];
+    let later = &scene.snapshot(3.0).interferers[0];
     assert!(
         (later.place_m - DVec3::new(0.0, 0.0, 3.0)).length() < 1e-9,
         "{}",

@@ -68,14 +68,14 @@ impl DepthMap {
     /// As [`Raster::read_map`]; a map without any surface; maps of different shape; reflectivities that are no shares.
     pub(crate) fn read(files: MapFiles) -> Result<Self, InputError> {
         let depth = Raster::read_map(&files.depth, files.unit_m, DEPTH_UNIT)?;
-        Self::of(files, depth)
+        Self::from_depths(files, depth)
     }
 
     /// A map whose depths, m, are at hand, 0 where nothing is; `files` says where they will stand, and which others are to be read.
     ///
     /// # Errors
     /// As `DepthMap::read`.
-    pub fn of(files: MapFiles, depth: Raster) -> Result<Self, InputError> {
+    pub fn from_depths(files: MapFiles, depth: Raster) -> Result<Self, InputError> {
         let (width, height) = (depth.width, depth.height);
         let complaint = |path: &Path, message: String| InputError::new(path.display(), message);
         let complain = |message: String| Err(complaint(&files.depth, message));
@@ -272,7 +272,7 @@ impl DepthMap {
         let pixel = self.pixel_of(point).and_then(|at| self.camera.pixel_at(at));
         let value = |raster: &Option<Raster>| {
             let ((row, col), raster) = (pixel?, raster.as_ref()?);
-            Some(f64::from(raster.at(row as usize, col as usize)))
+            Some(f64::from(raster.value(row as usize, col as usize)))
         };
         (value(&self.reflectivity), value(&self.grey))
     }
@@ -437,7 +437,7 @@ mod tests {
                 let expected = plane.intersect(&ray).unwrap();
                 let Meeting { range_m, .. } = map.meet(&ray).unwrap();
                 prop_assert!((range_m / expected - 1.0).abs() < 1e-5, "{range_m} {expected}");
-                let normal = map.normal_at(ray.at(range_m));
+                let normal = map.normal_at(ray.point(range_m));
                 prop_assert!(normal.dot(plane.placed().normal_at(DVec3::ZERO, 0)).abs() > 1.0 - 1e-4);
             }
         }

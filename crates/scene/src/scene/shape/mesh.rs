@@ -163,10 +163,10 @@ impl Mesh {
             );
             return Err(complain(message));
         }
-        Ok(Mesh::of(path, listed))
+        Ok(Mesh::from_triangles(path, listed))
     }
 
-    fn of(path: &Path, listed: Listed) -> Self {
+    fn from_triangles(path: &Path, listed: Listed) -> Self {
         let corners = |triangle: [u32; 3]| triangle.map(|corner| listed.corners[corner as usize]);
         let used = || {
             listed
@@ -236,7 +236,7 @@ impl Mesh {
             range_m < other.range_m
                 || (range_m == other.range_m && number(part) < number(other.part))
         };
-        let start = about.at(skipped).as_vec3a();
+        let start = about.point(skipped).as_vec3a();
         self.tree.follow(start, ray.direction.as_vec3a(), |places| {
             for part in places.start as u32..places.end as u32 {
                 if let Some(range_m) = self.meet_triangle(ray, part)

@@ -117,7 +117,7 @@ mod tests {
             let centre_m = DVec3::new(0.3, -0.2, 8.0);
             let ray = ray(x, y, 8.0);
             if let Some(range_m) = (Shape::Sphere { centre_m, radius_m }).intersect(&ray) {
-                prop_assert!(((ray.at(range_m) - centre_m).length() - radius_m).abs() < 1e-6);
+                prop_assert!(((ray.point(range_m) - centre_m).length() - radius_m).abs() < 1e-6);
             }
         }
     }

@@ -35,7 +35,7 @@ pub fn circuit(bins: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("metdc");
     let clk = m.input("CLK");
     let event = m.input("SPAD_EVENT");
-    let strobe_inputs = StrobeInputs::of(&mut m);
+    let strobe_inputs = StrobeInputs::declare(&mut m);
     let clear = m.input("PIXEL_CLEAR");
     let hit = m.output_bus("HIT", bins);
     let shift = m.wire_bus("SHIFT", bins);
@@ -73,7 +73,7 @@ pub(super) struct StrobeInputs {
 
 impl StrobeInputs {
     /// The ports LOCAL_STOP, STOP, STOP_D, COUNTER_RESET and CONVENTIONAL.
-    pub(super) fn of(m: &mut ModuleBuilder) -> Self {
+    pub(super) fn declare(m: &mut ModuleBuilder) -> Self {
         StrobeInputs {
             local_stop: m.input("LOCAL_STOP"),
             stop: m.input("STOP"),

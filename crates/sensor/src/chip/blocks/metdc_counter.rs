@@ -49,7 +49,7 @@ const fn code_bits(bins: usize) -> usize {
 pub fn circuit(bins: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("metdc");
     let clk = m.input("CLK");
-    let strobe_inputs = metdc::StrobeInputs::of(&mut m);
+    let strobe_inputs = metdc::StrobeInputs::declare(&mut m);
     let clear = m.input("PIXEL_CLEAR");
     let select = m.output_bus("SELECTED", bins);
     let strobe = m.wire("STROBE");

@@ -225,7 +225,7 @@ mod tests {
                         );
                         assert_eq!(
                             law.rises(start),
-                            Rises::of(&config, start),
+                            Rises::from_start_value(&config, start),
                             "{config:?} {start}"
                         );
                     }

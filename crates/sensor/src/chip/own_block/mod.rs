@@ -96,7 +96,7 @@ mod tests {
         m.input("LOCAL_STOP");
         let more = m.output("MORE");
         m.gate_into(CellKind::Inv, &init[..1], more);
-        let block = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+        let block = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
         assert_eq!(
             CONTRACTS[0].holds(&block, &built_in).unwrap_err(),
             "mine.json: module mine has other ports than p_counter: COUNTER_INIT has 8 bits instead of 9, \
@@ -122,7 +122,7 @@ mod tests {
             m.gate_into(CellKind::Nand2, &[clk, b], a);
             m.gate_into(CellKind::Buf, &[a], b);
         }
-        let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+        let own = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
         CONTRACTS[0].holds(&own, &built_in)
     }
 
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn blocks_are_told_apart_by_their_file_and_text() {
         let built_in = front_end::circuit(&SensorConfig::default());
-        let block = |file: &str, text: &str| OwnBlock::of(file, built_in.clone(), text);
+        let block = |file: &str, text: &str| OwnBlock::from_module(file, built_in.clone(), text);
         let same = block("mine.json", "a");
         assert_eq!(same, block("mine.json", "a"));
         assert_ne!(same, block("other.json", "a"));
@@ -175,7 +175,7 @@ mod tests {
             m.input_bus("THRESHOLD", 5);
             let event = m.output("SPAD_EVENT");
             m.gate_into(CellKind::Inv, &[[timed, event_type][bus][1]], event);
-            let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+            let own = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
             CONTRACTS[1].holds(&own, &built_in)
         };
         assert_eq!(event_of(0), Ok(()));
@@ -286,7 +286,7 @@ mod tests {
                     }
                 }
             }
-            let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+            let own = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
             let mut contracts = CONTRACTS.iter();
             let contract = contracts.find(|contract| contract.name == name).unwrap();
             contract.holds(&own, &built_in).unwrap_err()

@@ -53,7 +53,7 @@ impl CellLibrary {
     ///
     /// # Errors
     /// The key at fault and what is wrong: a file that cannot be read or is no library, a corner without one, cells that are not there.
-    pub fn of(config: &SensorConfig) -> Result<Self, (&'static str, String)> {
+    pub fn from_config(config: &SensorConfig) -> Result<Self, (&'static str, String)> {
         let (key, path) = match config.corner {
             Corner::Typ => ("liberty", &config.liberty),
             Corner::Slow => ("liberty_slow", &config.liberty_slow),

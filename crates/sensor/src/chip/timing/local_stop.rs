@@ -78,7 +78,7 @@ impl LocalStopDelays {
             return None;
         }
         let found = self.counter.counted(start).rises[0];
-        let expected = Rises::of(config, start).map(|rises| rises.first);
+        let expected = Rises::from_start_value(config, start).map(|rises| rises.first);
         (found.map(i64::from) != expected).then_some(found)
     }
 

@@ -492,7 +492,7 @@ pub struct MacropixelDelays {
 
 impl MacropixelDelays {
     /// Measures them.
-    pub(crate) fn of(paths: &MacropixelPaths<'_>) -> Self {
+    pub(crate) fn measure(paths: &MacropixelPaths<'_>) -> Self {
         let circuit = paths.circuit;
         let net = |probe| circuit.probes.net(probe);
         let rise = paths.after_clk(Edge::Rise);

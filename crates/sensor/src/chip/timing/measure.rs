@@ -25,7 +25,7 @@ pub(in crate::chip) struct MeasuredDelays {
 
 impl ChipTiming {
     /// The timing of a sensor without mismatch, in its corner at its temperature.
-    pub fn of(config: &SensorConfig) -> Self {
+    pub fn new(config: &SensorConfig) -> Self {
         MeasuredDelays::known(config).timing
     }
 
@@ -55,8 +55,8 @@ impl ResetPulse {
         let circuit = MacropixelCircuit::new(config, (0, 0));
         let timing = silicon.timing(&circuit.netlist);
         let paths = circuit.paths(&timing);
-        let delays = MacropixelDelays::of(&paths);
-        let counter = CounterDelays::of(&paths, &delays);
+        let delays = MacropixelDelays::measure(&paths);
+        let counter = CounterDelays::measure(&paths, &delays);
         let limits = (&silicon.limits(Limits::Kept), silicon.corner);
         Self::among(&circuit, (&delays, &counter), limits)
     }
@@ -107,11 +107,11 @@ impl MeasuredDelays {
         static MEASURED: LazyLock<Mutex<HashMap<Circuit, MeasuredDelays>>> =
             LazyLock::new(Mutex::default);
         let measured = || MEASURED.lock().unwrap_or_else(PoisonError::into_inner);
-        let circuit = Circuit::of(config).expect("checked");
+        let circuit = Circuit::new(config).expect("checked");
         if let Some(known) = measured().get(&circuit) {
             return known.clone();
         }
-        let delays = Self::measure(config, &Silicon::of(config));
+        let delays = Self::measure(config, &Silicon::new(config));
         measured().insert(circuit, delays.clone());
         delays
     }
@@ -121,8 +121,8 @@ impl MeasuredDelays {
         let circuit = MacropixelCircuit::new(config, (0, 0));
         let timing = silicon.timing(&circuit.netlist);
         let paths = circuit.paths(&timing);
-        let delays = MacropixelDelays::of(&paths);
-        let counter = CounterDelays::of(&paths, &delays);
+        let delays = MacropixelDelays::measure(&paths);
+        let counter = CounterDelays::measure(&paths, &delays);
         let library = silicon.limits(Limits::Kept);
         let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, silicon.corner));
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
@@ -253,7 +253,7 @@ pub(super) struct Circuit {
 
 impl Circuit {
     /// Of this sensor; `None` where its corner has no library.
-    pub(super) fn of(config: &SensorConfig) -> Option<Self> {
+    pub(super) fn new(config: &SensorConfig) -> Option<Self> {
         Some(Circuit {
             spads: config.spads(),
             front_end: config.front_end,
@@ -271,7 +271,7 @@ impl Circuit {
             overflow: config.overflow,
             corner: config.corner,
             temperature: config.temperature_c.map(f64::to_bits),
-            library: CellLibrary::of(config).ok()?,
+            library: CellLibrary::from_config(config).ok()?,
         })
     }
 }

@@ -81,7 +81,7 @@ impl Edges {
                 return Found::Race(Conflict::ResetStrobeAtHitReset, strobe, held, None);
             }
         }
-        let Some(rises) = Rises::of(&self.config, start) else {
+        let Some(rises) = Rises::from_start_value(&self.config, start) else {
             return Found::Never;
         };
         let no_more = timing.stop_to_reset_release - counter.removal - NEAR;
@@ -155,7 +155,7 @@ impl Edges {
         let Some(Rises {
             first,
             every: Some(every),
-        }) = Rises::of(&self.config, start)
+        }) = Rises::from_start_value(&self.config, start)
         else {
             return Found::Never;
         };
@@ -399,7 +399,7 @@ prop_compose! {
             stop_to_reset_release: stop_to_reset + reset,
             stop_to_hit_release: stop_to_hit_reset + hit_reset,
             clk_period: Time::ZERO,
-            ..ChipTiming::of(&SensorConfig::default())
+            ..ChipTiming::new(&SensorConfig::default())
         }
     }
 }

@@ -119,7 +119,7 @@ impl WindowLaw {
         if let Some(race) = self.short_reset().or_else(|| self.reset_strobe(start)) {
             return Err(Window::Race(race));
         }
-        let Some(rises) = Rises::of(&self.sensor, start) else {
+        let Some(rises) = Rises::from_start_value(&self.sensor, start) else {
             return Err(Window::Never);
         };
         let released = timing.stop_to_reset_release + counter.release + counter.recovery;
@@ -205,7 +205,7 @@ impl WindowLaw {
             return Err(Window::Race(race));
         }
         // A built-in counter without memory wraps.
-        let Some(rises) = Rises::of(&self.sensor, start) else {
+        let Some(rises) = Rises::from_start_value(&self.sensor, start) else {
             return Err(Window::Never);
         };
         let Some(every) = rises.every else {

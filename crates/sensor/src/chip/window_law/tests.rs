@@ -12,7 +12,7 @@ fn law(config: &SensorConfig) -> WindowLaw {
 
 #[test]
 fn the_typical_ripple_is_the_published_one() {
-    let ripple = ChipTiming::of(&SensorConfig::default()).ripple();
+    let ripple = ChipTiming::new(&SensorConfig::default()).ripple();
     assert!((ripple.as_ns() - 1.2).abs() < 0.01, "{ripple}");
 }
 
@@ -254,7 +254,7 @@ proptest! {
         };
         let window = |config: &SensorConfig| WindowLaw::new(config, &Exposure::new(config, 512, 1)).window(start);
         let fast = config(load_mhz * 1e6);
-        let pulse = ChipTiming::of(&fast).counter.load_pulse;
+        let pulse = ChipTiming::new(&fast).counter.load_pulse;
         let is_over = pulse.is_some_and(|pulse| pulse * 2 < fast.load_clock().period());
         match window(&fast) {
             Window::Race(Race { what: Conflict::InitAtLoadPulse, cure: Cure::LoadPeriod(at_least), .. }) => {

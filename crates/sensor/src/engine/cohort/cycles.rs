@@ -39,7 +39,7 @@ pub(super) struct LikeCycles {
 #[cfg(test)]
 impl LikeCycles {
     /// Cycles in whose bins there are `means` photons on a SPAD, after much light of `before` photons in each step.
-    pub(super) fn of(cycles: u64, blindness: Blindness, before: f64, means: &[f64]) -> Self {
+    pub(super) fn steady(cycles: u64, blindness: Blindness, before: f64, means: &[f64]) -> Self {
         LikeCycles {
             cycles,
             ages: Ages::steady(&blindness, before),

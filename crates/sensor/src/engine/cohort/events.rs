@@ -13,7 +13,7 @@ pub(super) struct EventTable(pub(super) SmallVec<[bool; 17]>);
 
 impl EventTable {
     /// By TYPE and THRESHOLD, or, where delay lines time photons, an odd number: each SPAD turns the photon line over.
-    pub(super) fn of(sensor: &SensorConfig) -> Self {
+    pub(super) fn from_sensor(sensor: &SensorConfig) -> Self {
         Self::new(sensor.spads(), |fired| match sensor.tdc {
             Tdc::DelayLine => fired % 2 == 1,
             // With a counter TDC nothing is drawn.

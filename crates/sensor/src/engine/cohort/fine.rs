@@ -289,7 +289,7 @@ impl Spad {
         for (cell, light) in self.cells.iter().enumerate() {
             let before = acts[cell];
             let returning = [0, 1].map(|trap| before.pulses[trap] + before.silent[trap]);
-            let [ours, _] = light.take(ready[0] + ready[1], returning[0] + returning[1]);
+            let [ours, _] = light.hit_and_ready(ready[0] + ready[1], returning[0] + returning[1]);
             crossing.push(secondaries.crosstalk * ours);
             let width_fs = self.width_fs(cell);
             acts.push(secondaries.act(light, crossing[cell], width_fs, &mut ready, returning));

@@ -182,7 +182,7 @@ impl<'a> Tree<'a> {
             self.laws.forget();
             self.each_node(|tree, node| {
                 let group = tree.free(node, p, 1.0 - p, 0.0);
-                let taken = tree.take(node, &group, random);
+                let taken = tree.draw_cycles(node, &group, random);
                 tree.spread(node, taken, &[group], true, &Outcome::default(), random);
             });
             self.step += 1;
@@ -199,7 +199,7 @@ impl<'a> Tree<'a> {
                 groups.clear();
                 groups.push(tree.free(node, p, q, 1.0));
                 tree.add_aged(node, p, q, &mut groups);
-                let taken = tree.take(node, &groups[0], random);
+                let taken = tree.draw_cycles(node, &groups[0], random);
                 if taken > 0 {
                     tree.spread(node, taken, &groups, true, &Outcome::default(), random);
                 }
@@ -227,7 +227,7 @@ impl<'a> Tree<'a> {
     }
 
     /// Takes those cycles out of `node` in which something happens from group `first` on.
-    fn take(&mut self, node: u32, first: &Group, random: &mut RandomWords) -> u64 {
+    fn draw_cycles(&mut self, node: u32, first: &Group, random: &mut RandomWords) -> u64 {
         let node = &mut self.nodes[node as usize];
         let (any, none) = (first.any_from_here, first.none_from_here);
         let taken = binomial(node.cycles, any.min(1.0), none, random);

@@ -126,7 +126,7 @@ impl Cohort {
     /// An engine for macropixels with a law of their own.
     pub fn with_law(law: WindowLaw, options: CohortOptions) -> Self {
         let sensor = law.sensor().clone();
-        let is_event = EventTable::of(&sensor);
+        let is_event = EventTable::from_sensor(&sensor);
         Cohort {
             law,
             windows: vec![OnceLock::new(); usize::from(sensor.largest_start()) + 1],

@@ -58,7 +58,7 @@ mod tests {
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
             for least in [1, 2] {
                 let blindness = Blindness::new(law, 1.6);
-                let like = LikeCycles::of(1, blindness, 0.1, &means);
+                let like = LikeCycles::steady(1, blindness, 0.1, &means);
                 let is_event = EventTable::new(16, |spads| spads >= least);
                 let mut random = RandomWords::new(5, 0);
                 let mut both = [[[0u32; BINS]; BINS]; 2];

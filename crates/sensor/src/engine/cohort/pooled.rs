@@ -81,7 +81,7 @@ fn follow<const MOST: usize>(
 ) -> Counts {
     let mut counts = Counts::new();
     for odds in odds.chunks(LANES) {
-        let mut seen = see::<MOST>(odds, spads, cycles, random);
+        let mut seen = draw_hits::<MOST>(odds, spads, cycles, random);
         let sums = seen.hits();
         let (overlaps, candidates) = pool.candidates(&sums, random);
         for lane in 0..odds.len() {
@@ -151,7 +151,7 @@ impl Seen {
 /// With o = p/(1 − p), of cycles in which k or more of n SPADs are hit it is k with probability 1/tₖ, where
 /// tₖ = 1 + (n − k)/(k + 1) · o · tₖ₊₁ and tₙ = 1: every term is positive, so no digits are lost.
 #[inline(always)]
-fn see<const MOST: usize>(
+fn draw_hits<const MOST: usize>(
     odds_of_periods: &[f64],
     spads: usize,
     cycles: u64,

@@ -142,7 +142,7 @@ impl Cohort {
             let ages = scene.start(&blindness, class);
             (blindness, ages)
         } else {
-            let secondaries = Secondaries::of(spads);
+            let secondaries = Secondaries::new(spads);
             let (is_event, error) = (&self.is_event, self.options.error);
             let fine = fine::solve(scene, &blindness, secondaries, class, is_event, error)?;
             means = fine.photons;

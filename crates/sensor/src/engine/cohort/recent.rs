@@ -358,7 +358,7 @@ mod tests {
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
             for is_event in events() {
                 let blindness = Blindness::new(law, 2.6);
-                let like = LikeCycles::of(1, blindness, 0.1, &light());
+                let like = LikeCycles::steady(1, blindness, 0.1, &light());
                 let no_event = is_event.no_event().unwrap();
                 let spads = (no_event.weight, is_event.spads());
                 let spads = Weighted::new(&like.blindness, &like.ages, spads, 1);
@@ -461,7 +461,7 @@ mod tests {
         let found = |neglect, mean: f64, is_event: &EventTable| {
             let blindness = Blindness::new(DeadTimeLaw::NonParalysable, 3.07);
             let means: Means = light().iter().map(|light| light * mean).collect();
-            let like = LikeCycles::of(1, blindness, 0.01, &means);
+            let like = LikeCycles::steady(1, blindness, 0.01, &means);
             histories(&like, is_event, neglect).map(|found| found.known)
         };
         assert_eq!(found(1e-4, 0.02, &is_event), Some(4));

@@ -64,7 +64,7 @@ impl Cell {
     }
 
     /// Those of `ready` SPADs and of `returning` ones to which something happens, and those that are ready afterwards.
-    pub(super) fn take(&self, ready: f64, returning: f64) -> [f64; 2] {
+    pub(super) fn hit_and_ready(&self, ready: f64, returning: f64) -> [f64; 2] {
         let taken = ready * self.any + returning * self.fire;
         [taken, ready * self.none + returning * self.stay]
     }
@@ -87,7 +87,7 @@ pub(super) struct Secondaries {
 }
 
 impl Secondaries {
-    pub(super) fn of(spads: &SpadModel) -> Self {
+    pub(super) fn new(spads: &SpadModel) -> Self {
         let time_fs = spads.afterpulse_time.as_fs() as f64;
         let afterpulses = spads.afterpulse_probability > 0.0;
         // Of four neighbours that each SPAD would have without the edge of the macropixel: 3 of 4 in 4×4.
@@ -123,7 +123,7 @@ impl Secondaries {
     ) -> Acts {
         let mut acts = Acts::default();
         if self.are_none() {
-            [acts.pulses[0], ready[0]] = photons.take(ready[0], returning[0]);
+            [acts.pulses[0], ready[0]] = photons.hit_and_ready(ready[0], returning[0]);
             return acts;
         }
         let total = photons.and(crossing);
@@ -133,7 +133,7 @@ impl Secondaries {
                 continue;
             }
             let hazard = &hazards[trap];
-            let [taken, left] = hazard.take(ready[trap], returning[trap]);
+            let [taken, left] = hazard.hit_and_ready(ready[trap], returning[trap]);
             ready[trap] = left;
             if taken == 0.0 {
                 continue;

@@ -141,7 +141,7 @@ impl Levelised {
     ) -> Result<Self, Unlevelled> {
         let mut leveliser = Leveliser {
             survey,
-            cell_library: Silicon::of(config).cell_library.cells(),
+            cell_library: Silicon::new(config).cell_library.cells(),
             config,
             period_fs: exposure.clock.period().as_fs(),
             fastest_fs: fastest_cell_fs(survey),

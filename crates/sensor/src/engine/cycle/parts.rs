@@ -117,7 +117,7 @@ impl Parts {
         let mut run_from = vec![None; tape.actions.len()];
         for (index, action) in samplers().filter(|&(index, _)| deferrable.contains(index)) {
             let tap = match action.code {
-                Code::Sampler { tap, offset } => tape.taps[usize::from(tap)].at(offset),
+                Code::Sampler { tap, offset } => tape.taps[usize::from(tap)].delayed_by(offset),
                 _ => unreachable!("a sampler"),
             };
             if let Some(run) = runs.last_mut().filter(|run| run.actions.end == index)

@@ -360,7 +360,7 @@ impl Passes<'_, '_> {
                 && self
                     .block
                     .pending
-                    .take(&self.parts.runs[usize::from(run)].actions)
+                    .remove_range(&self.parts.runs[usize::from(run)].actions)
             {
                 self.sample(usize::from(run));
                 return [true; 2];

@@ -149,7 +149,7 @@ pub(super) struct Flow<'a> {
 
 impl Tap {
     /// The same sequence, `offset` periods later.
-    pub(super) fn at(self, offset: i8) -> Self {
+    pub(super) fn delayed_by(self, offset: i8) -> Self {
         Tap {
             place: self.place.wrapping_add_signed(offset.into()),
             ..self

@@ -74,9 +74,9 @@ impl Survey {
     /// Simulates power-up and load of every start value, and sorts the nets.
     pub(super) fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
         let netlist = Netlist::elaborate(&array::subarray(config, (0, 0), (1, 1)));
-        let timing = Silicon::of(config).timing(&netlist);
+        let timing = Silicon::new(config).timing(&netlist);
         let bins = Probes::of_macropixel(&netlist, 0, 0).bins().to_vec();
-        let pins = SensorPins::of(&netlist);
+        let pins = SensorPins::find(&netlist);
         let mut driver = vec![None; netlist.net_count()];
         for (index, cell) in netlist.cells().iter().enumerate() {
             for (output, net) in cell.outputs.iter().enumerate() {

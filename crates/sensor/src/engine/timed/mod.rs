@@ -88,7 +88,7 @@ impl Timed {
     pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure, runner: Runner) -> Self {
         let made: Sensor = sensor.into();
         let silicon = *made.silicon();
-        let sensor = made.made_of(&Silicon::of(&made));
+        let sensor = made.made_of(&Silicon::new(&made));
         // Macropixels differ in the names of their cells only.
         let circuit = MacropixelCircuit::new(&sensor, (0, 0));
         let mut engine = Timed {
@@ -125,7 +125,7 @@ impl Timed {
     }
 
     /// Counts in closed form where a macropixel's delays decide every order of events.
-    fn judge(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
+    fn count_in_closed_form(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
         match self.uniform.tdc {
             Tdc::Clocked => {}
             Tdc::Counter => return Ok(Judged::InDoubt(Doubt::CounterTdc)),
@@ -287,9 +287,9 @@ impl Timed {
 
     fn orders(&self, timing: &Timing) -> Orders {
         let paths = self.circuit.paths(timing);
-        let macropixel = MacropixelDelays::of(&paths);
+        let macropixel = MacropixelDelays::measure(&paths);
         let is_guided = self.setting.sensor.mode == Mode::Guided;
-        let counter = is_guided.then(|| CounterDelays::of(&paths, &macropixel));
+        let counter = is_guided.then(|| CounterDelays::measure(&paths, &macropixel));
         let delays = Delays {
             macropixel,
             counter,
@@ -333,7 +333,7 @@ impl Replay for Timed {
         let arrive = self.arrive(pixels.iter().map(|pixel| pixel.start));
         let judge = |pixel: &PulsedPixel<'_>| {
             if arrive[&pixel.start] {
-                self.judge(pixel)
+                self.count_in_closed_form(pixel)
             } else {
                 Ok(Judged::InDoubt(Doubt::Load))
             }

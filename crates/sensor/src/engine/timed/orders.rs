@@ -135,7 +135,7 @@ impl Orders {
             Window::Race(_) => self.bin_by_bin(setting, start),
             Window::Never => {
                 // No count is earlier than the one of CLK's first falling edge.
-                let is_reset_first = Rises::of(config, start).is_none_or(|rises| {
+                let is_reset_first = Rises::from_start_value(config, start).is_none_or(|rises| {
                     let count = exposure.falling(rises.first) + self.counter_clk;
                     count > exposure.stop(1) + self.reset + MARGIN
                 });

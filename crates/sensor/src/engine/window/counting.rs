@@ -212,7 +212,7 @@ impl<'a> Counting<'a> {
             codes: Codes::default(),
             scratch: Scratch::default(),
             first_code: [0; 2],
-            tables: Tables::take(),
+            tables: Tables::from_pool(),
             together: Vec::new(),
             fired: [0; ROWS],
             pulses_fs: Vec::new(),

@@ -60,9 +60,10 @@ impl Window {
         window: &OpenWindow,
     ) -> (Vec<i64>, Work) {
         let config = stream.config();
-        let cancelling = Cancelling::of(config.spads.shortest_dead_time(), config.clock, || {
-            self.law.clone()
-        });
+        let cancelling =
+            Cancelling::from_law(config.spads.shortest_dead_time(), config.clock, || {
+                self.law.clone()
+            });
         let mut hits = self.law.empty_hits(window);
         let mut work = Work::default();
         let mut cancelled = 0;

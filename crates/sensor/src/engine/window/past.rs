@@ -76,14 +76,14 @@ impl<'a> Past<'a> {
                 photons.push(Photon::new(time, spad, light.breeds()));
             }
         };
-        for photon in draws.of(light, part, self.cycle, What::Slot(self.slot)) {
+        for photon in draws.photons(light, part, self.cycle, What::Slot(self.slot)) {
             push(self.cycle, photon);
         }
         for later in light.echoes_within(&(slot_fs..end_fs)) {
             if let Some(cycle) = self.cycle_after(later) {
                 let moved_fs = (start(cycle) - start(self.cycle)).as_fs();
                 let within_fs = slot_fs - moved_fs..end_fs - moved_fs;
-                let echo = draws.of(light, part, cycle, What::Echo);
+                let echo = draws.photons(light, part, cycle, What::Echo);
                 echo.filter(|(_, time_fs, _)| within_fs.contains(time_fs))
                     .for_each(|photon| push(cycle, photon));
             }
@@ -137,7 +137,7 @@ impl PastDraws {
     }
 
     /// The photons of a laser cycle. `light` is part number `part` of the macropixel's.
-    fn of(
+    fn photons(
         &mut self,
         light: &PixelStream<'_>,
         part: usize,

@@ -67,11 +67,11 @@ thread_local! {
 
 impl Tables {
     /// Tables to count in, whatever they hold.
-    pub(super) fn take() -> Self {
+    pub(super) fn from_pool() -> Self {
         KEPT.take().unwrap_or_default()
     }
 
-    /// For this thread's next [`Tables::take`].
+    /// For this thread's next [`Tables::from_pool`].
     pub(super) fn keep(self) {
         KEPT.set(Some(self));
     }

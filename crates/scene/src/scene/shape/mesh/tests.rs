@@ -169,8 +169,8 @@ fn a_cube_of_quadrangles_is_a_box() {
             (Some(a), Some(b)) => {
                 assert!((a.range_m - b.range_m).abs() < 1e-5);
                 let normals = [
-                    mesh.normal_at(ray.at(a.range_m), a.part),
-                    cuboid.normal_at(ray.at(b.range_m), b.part),
+                    mesh.normal_at(ray.point(a.range_m), a.part),
+                    cuboid.normal_at(ray.point(b.range_m), b.part),
                 ];
                 assert!(normals[0].dot(normals[1]).abs() > 1.0 - 1e-6);
             }
@@ -206,7 +206,7 @@ fn a_fine_ball_of_triangles_is_a_sphere() {
             continue;
         };
         // Facets lie below the sphere by up to 2 m · (1 - cos(pi/400)) along rings and as much along columns.
-        let below = 2.0 - ray.at(a).distance(centre_m);
+        let below = 2.0 - ray.point(a).distance(centre_m);
         assert!((0.0..1.3e-4).contains(&below) && a >= b, "{below} {a} {b}");
     }
 }
@@ -219,7 +219,7 @@ fn texture_coordinates_come_from_the_file() {
     for (x, y) in [(0.25, 0.125), (0.75, 0.875), (0.5, 0.5)] {
         let ray = Ray::new(DVec3::new(x, y, -3.0), DVec3::Z);
         let Meeting { range_m, part } = mesh.meet(&ray).unwrap();
-        let (u, v) = mesh.on_surface(ray.at(range_m), part);
+        let (u, v) = mesh.on_surface(ray.point(range_m), part);
         assert!(
             (u - 2.0 * x).abs() < 1e-6 && (v - y).abs() < 1e-6,
             "{u} {v}"

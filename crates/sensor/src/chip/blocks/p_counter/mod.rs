@@ -147,7 +147,7 @@ pub struct Rises {
 impl Rises {
     /// When a sensor's LOCAL_STOP rises from this start value; `None` where it is high from the reset on and blocks
     /// the counter for good.
-    pub fn of(config: &SensorConfig, start: u16) -> Option<Self> {
+    pub fn from_start_value(config: &SensorConfig, start: u16) -> Option<Self> {
         if let Some(law) = config.counter_law() {
             return law.rises(start);
         }
@@ -229,7 +229,7 @@ mod tests {
             let mut model = Model::new(&config, start);
             prop_assert_eq!(model.local_stop(), starts_high(&config, start));
             let found: Vec<i64> = (0..1000).filter(|_| model.clock()).collect();
-            let expected: Vec<i64> = match Rises::of(&config, start) {
+            let expected: Vec<i64> = match Rises::from_start_value(&config, start) {
                 None => vec![],
                 Some(Rises { first, every: None }) => vec![first],
                 Some(Rises { first, every: Some(every) }) => (first..1000).step_by(every as usize).collect(),

@@ -66,7 +66,7 @@ impl Model {
     ///
     /// # Panics
     /// When there is no ring.
-    pub fn of(netlist: &Netlist, timing: &Timing, path: &str) -> Self {
+    pub fn from_netlist(netlist: &Netlist, timing: &Timing, path: &str) -> Self {
         let cell = |name: &str| {
             if path.is_empty() {
                 netlist.cell(name)

@@ -55,7 +55,7 @@ pub struct CounterDelays {
 
 impl CounterDelays {
     /// Measures them; `delays` are those of the same paths.
-    pub(crate) fn of(paths: &MacropixelPaths<'_>, delays: &MacropixelDelays) -> Self {
+    pub(crate) fn measure(paths: &MacropixelPaths<'_>, delays: &MacropixelDelays) -> Self {
         let (circuit, run) = (paths.circuit, delays.run);
         let net = |probe| circuit.probes.net(probe);
         let fall = paths.after_clk(Edge::Fall);

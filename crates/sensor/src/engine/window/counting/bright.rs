@@ -73,7 +73,12 @@ pub(super) struct Beginning {
 
 impl Beginning {
     /// That of the block which is running at a time in or before `laser_cycle`.
-    fn at(time: Time, laser_cycle: u32, stream: &PhotonStream, light: &PixelStream<'_>) -> Self {
+    fn from_time(
+        time: Time,
+        laser_cycle: u32,
+        stream: &PhotonStream,
+        light: &PixelStream<'_>,
+    ) -> Self {
         let ends_fs = stream.ends_fs();
         let first = |cycle| stream.cycle_start(cycle) + Time::from_fs(ends_fs.start);
         let mut cycle = laser_cycle;
@@ -267,7 +272,7 @@ impl Counting<'_> {
         let echo_from = Time::from_fs(pixel.light.echo_fs().start);
         let mut from = from.max(Time::ZERO);
         loop {
-            let begin = Beginning::at(from, window.laser_cycle, self.stream, pixel.light);
+            let begin = Beginning::from_time(from, window.laser_cycle, self.stream, pixel.light);
             let Some(known_from) = begin.time else {
                 return begin;
             };
@@ -293,7 +298,7 @@ impl Counting<'_> {
     ) {
         let since = begin.time.map_or(begin, |time| {
             let time = time - self.stream.config().spads.reach();
-            Beginning::at(time, window.laser_cycle, self.stream, &pixel.parts[part])
+            Beginning::from_time(time, window.laser_cycle, self.stream, &pixel.parts[part])
         });
         self.push_photons(pixel, part, since, window);
     }
@@ -328,7 +333,7 @@ impl Counting<'_> {
         let is_wanted =
             |photon: &&Photon| (light.breeds() || photon.time >= from) && photon.time < until;
         for cycle in self.echoes(light, from, window) {
-            let echo = self.listed[part].of(light, cycle).iter();
+            let echo = self.listed[part].photons(light, cycle).iter();
             self.photons.extend(echo.filter(is_wanted));
         }
     }

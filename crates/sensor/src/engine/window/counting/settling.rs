@@ -109,7 +109,7 @@ impl Counting<'_> {
                 // Photons that cause others did not matter to the window so far, but may when it is looked back.
                 pixel.work = work;
                 self.fired[..=pixel.hits.len()].fill(0);
-                let photons = self.breeding.of(laser_cycle..laser_cycle + 1).iter();
+                let photons = self.breeding.photons(laser_cycle..laser_cycle + 1).iter();
                 self.photons.clear();
                 self.photons.extend(photons.map(|&(_, photon)| photon));
                 self.take_cycle(pixel, Some(last), laser_cycle);
@@ -124,17 +124,17 @@ impl Counting<'_> {
         }
         if is_doubtful {
             for row in 0..=pixel.hits.len() {
-                self.tell(pixel, row);
+                self.count_fired(pixel, row);
             }
         }
         for index in 0..self.together.len() {
             let row = self.together[index].1.row();
-            self.tell(pixel, row);
+            self.count_fired(pixel, row);
         }
     }
 
     /// Adds what fired in a CLK period to its bin.
-    fn tell(&mut self, pixel: &mut Pixel<'_>, row: usize) {
+    fn count_fired(&mut self, pixel: &mut Pixel<'_>, row: usize) {
         let spads = std::mem::take(&mut self.fired[row]);
         self.fire(pixel, row, spads);
     }

@@ -139,7 +139,7 @@ impl Tabling<'_> {
                 .collect();
             for words in words {
                 for &word in words {
-                    let place = places.of(word);
+                    let place = places.place(word);
                     if place >= self.end {
                         continue;
                     }
@@ -221,7 +221,7 @@ impl Tabling<'_> {
             let seen = rows.iter().zip(possible).zip(high);
             let seen = seen.map(|((row, possible), &word)| {
                 let is_known = (row == possible) & bins.contains(row);
-                u32::from(is_known & (places.of(word) < places.end))
+                u32::from(is_known & (places.place(word) < places.end))
             });
             self.seen += u64::from(seen.sum::<u32>());
             let unknown = std::mem::take(&mut kept.unknown);

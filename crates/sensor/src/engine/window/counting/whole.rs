@@ -298,13 +298,13 @@ impl ByWindow {
     }
 
     /// Photons for the windows of these laser cycles.
-    pub(super) fn of(&self, windows: std::ops::Range<u32>) -> &[(u32, Photon)] {
+    pub(super) fn photons(&self, windows: std::ops::Range<u32>) -> &[(u32, Photon)] {
         let before = |cycle| self.photons.partition_point(|&(window, _)| window < cycle);
         &self.photons[before(windows.start)..before(windows.end)]
     }
 
     /// Photons for the windows of a group.
     pub(super) fn of_group(&self, group: Group) -> &[(u32, Photon)] {
-        self.of(group.first_cycle()..group.first_cycle().saturating_add(group.cycles()))
+        self.photons(group.first_cycle()..group.first_cycle().saturating_add(group.cycles()))
     }
 }

@@ -32,7 +32,7 @@ impl Tabling<'_> {
             for (number, &word) in (0..).zip(words) {
                 // Written always, kept if so: no branch to mispredict.
                 unknown[found] = number;
-                found += usize::from(is_in_doubt(places.of(word)));
+                found += usize::from(is_in_doubt(places.place(word)));
             }
             found
         };
@@ -48,7 +48,7 @@ impl Tabling<'_> {
                         let found = numbers(places, words, unknown);
                         keys.extend(unknown[..found].iter().map(|&number| {
                             let word = words[number as usize];
-                            let place = places.of(word);
+                            let place = places.place(word);
                             let cycle = self.group.first_cycle() + self.split(place).0;
                             let time_fs = part.slots().time_fs(run.slot, word);
                             key(place, time_fs - counting.moved_fs(cycle, later))
