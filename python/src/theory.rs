@@ -94,16 +94,16 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
         }
         "miss_probability" => {
             let model = model(word(0))?;
-            let of = move |r: &[f64]| detection::probability(&light(r), r[3] as u64, model).miss;
-            (4, boxed(of))
+            let miss = move |r: &[f64]| detection::probability(&light(r), r[3] as u64, model).miss;
+            (4, boxed(miss))
         }
         "laser_cycles_for" => {
             let model = model(word(0))?;
-            let of = move |r: &[f64]| {
+            let laser_cycles = move |r: &[f64]| {
                 let cycles = laser_cycles_for(r[3], &light(r), model);
                 cycles.map_or(f64::NAN, |cycles| cycles as f64)
             };
-            (4, boxed(of))
+            (4, boxed(laser_cycles))
         }
         "thompson" => (4, boxed(|r| precision::thompson(r[0], r[1], r[2], r[3]))),
         "cramer_rao" => (4, boxed(|r| precision::cramer_rao(r[0], r[1], r[2], r[3]))),
@@ -126,7 +126,7 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
                 let message = format!("{scheme:?} is no scheme; give full, zooming or sliding");
                 return Err(Failure::argument("scheme", message));
             }
-            let of = move |r: &[f64]| {
+            let laser_cycles = move |r: &[f64]| {
                 let system = system(r, detection, precision);
                 let cost = match scheme.as_str() {
                     "full" => system.full(r[0]),
@@ -135,10 +135,10 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
                 };
                 cost.laser_cycles()
             };
-            (9, boxed(of))
+            (9, boxed(laser_cycles))
         }
         "tolerated_sigma_m" => {
-            let of = |r: &[f64]| {
+            let tolerated_sigma_m = |r: &[f64]| {
                 let design = Design {
                     counter_bits: 1,
                     bins: r[1] as u32,
@@ -147,17 +147,17 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
                 };
                 design.tolerated_sigma_m()
             };
-            (2, boxed(of))
+            (2, boxed(tolerated_sigma_m))
         }
         "stereo_depth_error_m" => {
-            let of = |r: &[f64]| {
+            let depth_error_m = |r: &[f64]| {
                 let pair = StereoPair {
                     focal_px: r[2],
                     baseline_m: r[3],
                 };
                 pair.depth_error_m(r[0], r[1])
             };
-            (4, boxed(of))
+            (4, boxed(depth_error_m))
         }
         "non_paralysable_hz" => (2, boxed(|r| front_ends::non_paralysable_hz(r[0], r[1]))),
         "paralysable_hz" => (2, boxed(|r| front_ends::paralysable_hz(r[0], r[1]))),

@@ -268,7 +268,7 @@ impl Report<'_> {
 
     fn table(&self, out: &Path) -> Table {
         let ms = |s: f64| format!("{:.2} ms", 1e3 * s);
-        let of = |part: u64, whole: u64| format!("{part} of {whole}");
+        let part_of_whole = |part: u64, whole: u64| format!("{part} of {whole}");
         let clock = self.configuration.clock;
         let mut table = Table::new(format!(
             "{} frames of {}",
@@ -293,19 +293,19 @@ impl Report<'_> {
         .row("photons drawn", self.work.photons_drawn)
         .row(
             "CLK periods visited",
-            of(self.work.clk_periods_visited, self.work.clk_periods),
+            part_of_whole(self.work.clk_periods_visited, self.work.clk_periods),
         )
         .row(
             "macropixels not exposed again",
-            of(self.macropixels_reused, self.macropixels),
+            part_of_whole(self.macropixels_reused, self.macropixels),
         )
         .row(
             "loads not run again",
-            of(self.loads_reused.into(), self.frames.into()),
+            part_of_whole(self.loads_reused.into(), self.frames.into()),
         )
         .row(
             "macropixels' views not cast again",
-            of(self.views_reused, self.views),
+            part_of_whole(self.views_reused, self.views),
         );
         let each = ms(self.run_time_s / f64::from(self.frames));
         table.push(

@@ -304,7 +304,7 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
     }
     let sensor = problem.sensor();
     let usual = SensorConfig::default();
-    let of = |s: &SensorConfig| {
+    let design_values = |s: &SensorConfig| {
         (
             s.bins,
             s.bin_bits,
@@ -313,7 +313,7 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
             s.threshold,
         )
     };
-    let name = if of(sensor) == of(&usual) {
+    let name = if design_values(sensor) == design_values(&usual) {
         "The QuantIC4x4"
     } else {
         "The sensor itself"
@@ -388,7 +388,7 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
         "Designs for reflectivity {} at {} m, {} klux, {} frames/s that nothing beats",
         goal.reflectivity, goal.range_m, goal.illuminance_klux, goal.fps
     );
-    let at = |point: &Point| (point.area, 1e3 * point.power_w);
+    let area_and_power = |point: &Point| (point.area, 1e3 * point.power_w);
     let front = || found.front.iter().map(|one| &one.point);
     let powers = front().map(|point| point.power_w);
     let [least, most] = [f64::min, f64::max].map(|of| powers.clone().reduce(of).unwrap_or(1.0));
@@ -403,7 +403,7 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
     for pair in ends.windows(2) {
         let [from, to] = [pair[0] * goal.fps, pair[1] * goal.fps];
         let within = |point: &&Point| (from..to).contains(&point.fps.max(goal.fps));
-        let points: Vec<(f64, f64)> = front().filter(within).map(at).collect();
+        let points: Vec<(f64, f64)> = front().filter(within).map(area_and_power).collect();
         let name = if to.is_finite() {
             format!("{from:.0} to {to:.0} frames/s")
         } else {
@@ -414,7 +414,7 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
         }
     }
     if let Some(point) = found.own.point() {
-        chart = chart.points("this sensor", [at(point)]);
+        chart = chart.points("this sensor", [area_and_power(point)]);
     }
-    chart.points("balanced: sensor.toml", [at(proposed)])
+    chart.points("balanced: sensor.toml", [area_and_power(proposed)])
 }

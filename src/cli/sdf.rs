@@ -156,14 +156,14 @@ pub(super) fn annotated_timing(
     for oddity in oddities(&sdf, config.corner) {
         note(format_args!("{}:{}: {oddity}", sdf.source, oddity.line()));
     }
-    let at = |skipped: &Skipped| {
+    let skipped_line = |skipped: &Skipped| {
         format!(
             "{}:{}: left out or approximated {} of: {}",
             sdf.source, skipped.first_line, skipped.count, skipped.what
         )
     };
     for skipped in sdf.skipped.iter().chain(&result.notes) {
-        note(at(skipped));
+        note(skipped_line(skipped));
     }
     if result.longest_wire_to_d_fs > 0 {
         note(format_args!(

@@ -213,18 +213,21 @@ impl Disturbance {
             mean_error_m: super::found::mean(sums.errors_m.into_iter()),
         };
         let mut outcomes: Vec<Outcome> = by_scheme.into_iter().map(outcome).collect();
-        let of = |scheme| outcomes.iter().find(|outcome| outcome.scheme == scheme);
-        let of_equal_silicon = of("guided").zip(of("full")).map(|(guided, full)| {
-            let with_histogram = 1.0 / full.bins.div_ceil(guided.bins) as f64;
-            let of_draws = |share: f64| ends(share * self.draws as f64);
-            Outcome {
-                scheme: EQUAL_SILICON,
-                bins: guided.bins,
-                wrong: of_draws(full.wrong[0] * with_histogram),
-                lost: of_draws(1.0 - (1.0 - full.lost[0]) * with_histogram),
-                ..full.clone()
-            }
-        });
+        let scheme_outcome = |scheme| outcomes.iter().find(|outcome| outcome.scheme == scheme);
+        let of_equal_silicon =
+            scheme_outcome("guided")
+                .zip(scheme_outcome("full"))
+                .map(|(guided, full)| {
+                    let with_histogram = 1.0 / full.bins.div_ceil(guided.bins) as f64;
+                    let of_draws = |share: f64| ends(share * self.draws as f64);
+                    Outcome {
+                        scheme: EQUAL_SILICON,
+                        bins: guided.bins,
+                        wrong: of_draws(full.wrong[0] * with_histogram),
+                        lost: of_draws(1.0 - (1.0 - full.lost[0]) * with_histogram),
+                        ..full.clone()
+                    }
+                });
         outcomes.extend(of_equal_silicon);
         Ok(outcomes)
     }

@@ -121,7 +121,7 @@ pub(crate) fn point_with(
 
 /// Fig. 103, 104 and 105, with their numbers.
 pub(crate) fn charts(points: &[SweepPoint]) -> [(u32, Chart); 3] {
-    let at = |y: fn(&SweepPoint) -> f64| -> Vec<(f64, f64)> {
+    let curve = |y: fn(&SweepPoint) -> f64| -> Vec<(f64, f64)> {
         points.iter().map(|p| (p.distance_m, y(p))).collect()
     };
     let title = "9 frames of 3×3 macropixels at 72 klux";
@@ -135,24 +135,24 @@ pub(crate) fn charts(points: &[SweepPoint]) -> [(u32, Chart); 3] {
         Axis::linear("measured distance (m)"),
     )
     .whiskers("3 σ", whiskers)
-    .points("mean", at(|p| p.distance_m + p.mean_error_m))
-    .dashed("true", at(|p| p.distance_m));
+    .points("mean", curve(|p| p.distance_m + p.mean_error_m))
+    .dashed("true", curve(|p| p.distance_m));
     let sigma = Chart::new(
         format!("Standard deviation, {title}"),
         Axis::linear("distance (m)"),
         Axis::linear("σ (m)"),
     )
-    .points("measured on the model", at(|p| p.sigma_m))
-    .dashed("0.1 % of the distance", at(|p| 1e-3 * p.distance_m));
+    .points("measured on the model", curve(|p| p.sigma_m))
+    .dashed("0.1 % of the distance", curve(|p| 1e-3 * p.distance_m));
     let rms = Chart::new(
         format!("RMS error, {title}"),
         Axis::linear("distance (m)"),
         Axis::log("RMS error (m)"),
     )
-    .points("guided lidar", at(|p| p.rms_m))
-    .points("its stereo guide", at(|p| p.guide_rms_m))
-    .dashed("a quarter of a pixel, Eq. 27", at(|p| p.guide_theory_m))
-    .line("published, at most 0.15 m", at(|_| 0.15));
+    .points("guided lidar", curve(|p| p.rms_m))
+    .points("its stereo guide", curve(|p| p.guide_rms_m))
+    .dashed("a quarter of a pixel, Eq. 27", curve(|p| p.guide_theory_m))
+    .line("published, at most 0.15 m", curve(|_| 0.15));
     [(103, mean), (104, sigma), (105, rms)]
 }
 

@@ -52,7 +52,7 @@ impl Echo {
         };
         let response = Response::new(&wide, 1.0 / config.clk_hz, pulse);
         let sigma_bins = response.pulse_sigma_bins;
-        let at = |phase: usize| {
+        let information = |phase: usize| {
             let offset = (phase as f64 + 0.5) / PHASES as f64 - 0.5;
             response.information(&EchoLight {
                 position_bins: (BINS / 2) as f64 + offset,
@@ -62,7 +62,7 @@ impl Echo {
             })
         };
         Echo {
-            phases: (0..PHASES).map(at).collect(),
+            phases: (0..PHASES).map(information).collect(),
             sigma_bins,
         }
     }

@@ -302,13 +302,16 @@ mod tests {
         map.write_png(&path).unwrap();
         let (width, _, pixels) = decode(&path);
         let map_top = 2 * MARGIN_PX + LINE_PX;
-        let at = |row: usize, col: usize| {
+        let square = |row: usize, col: usize| {
             pixels[(map_top + row * 8 + 4) * width + MARGIN_PX + col * 8 + 4]
         };
         let (near, far) = (scale_colour(0.0), scale_colour(1.0));
         let [sky, dark, lost] = [0, 1, 2].map(|i| CATEGORY_COLOURS[i]);
-        assert_eq!([at(0, 0), at(0, 1), at(0, 2)], [near, sky, lost]);
-        assert_eq!([at(1, 0), at(1, 1), at(1, 2)], [far, far, near]);
+        assert_eq!(
+            [square(0, 0), square(0, 1), square(0, 2)],
+            [near, sky, lost]
+        );
+        assert_eq!([square(1, 0), square(1, 1), square(1, 2)], [far, far, near]);
         // The legend shows what occurs, and nothing else.
         let legend = &pixels[(map_top + 4 * LINE_PX) * width..];
         assert!(legend.contains(&sky) && legend.contains(&lost) && !legend.contains(&dark));

@@ -236,15 +236,19 @@ pub(super) fn figure_90() -> Chart {
     let mut chart = chart(90);
     for step in 0..4 {
         let delay_ns = first_ns + 4.0 + 4.0 * f64::from(step);
-        let of = |pixel: usize| {
+        let nearest_bin = |pixel: usize| {
             let middles = &calibrated.macropixels[pixel][0].middle_s;
             let off = |bin: &usize| (middles[*bin] * 1e9 - delay_ns).abs();
             let bins = 0..middles.len();
             bins.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0) as f64
         };
         let rows = calibrated.sensor.rows;
-        let mean =
-            |col: usize| (0..rows).map(|row| of(row * cols + col)).sum::<f64>() / rows as f64;
+        let mean = |col: usize| {
+            (0..rows)
+                .map(|row| nearest_bin(row * cols + col))
+                .sum::<f64>()
+                / rows as f64
+        };
         let points: Vec<(f64, f64)> = (0..cols).map(|col| (col as f64, mean(col))).collect();
         chart = chart.line(format!("{delay_ns:.0} ns"), points);
     }

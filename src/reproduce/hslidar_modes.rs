@@ -84,7 +84,7 @@ struct Modes {
 
 impl Modes {
     fn measure() -> Self {
-        let of = |sensor: &Sensor| {
+        let intervals = |sensor: &Sensor| {
             let config = macropixel(sensor);
             let period = config.clock().period();
             (bin_interval(&config), window_step(&config), period)
@@ -95,8 +95,8 @@ impl Modes {
             ..SensorConfig::clone(&hslidar_delay_line())
         };
         Modes {
-            clocked: of(&hslidar()),
-            lines: of(&alike.into()),
+            clocked: intervals(&hslidar()),
+            lines: intervals(&alike.into()),
         }
     }
 }

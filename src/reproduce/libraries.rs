@@ -92,12 +92,13 @@ fn column(file: &Path) -> Result<(String, [String; FIGURES.len()]), InputError> 
         }
         Some(read) => {
             let ratio = read.liberty.area(CellKind::Dffsr) / read.liberty.area(CellKind::Dffr);
-            let of = |block: &str| {
+            let block_silicon = |block: &str| {
                 let mut blocks = power.silicon.iter();
                 blocks.find(|of| of.block == block).expect("a library's")
             };
-            let area = |block: &str| of(block).area;
-            let energy = |block: &str| of(block).internal_j + of(block).loads_j;
+            let area = |block: &str| block_silicon(block).area;
+            let energy =
+                |block: &str| block_silicon(block).internal_j + block_silicon(block).loads_j;
             let both = area(blocks[0]) + area(blocks[1]);
             let shares = [Some(share(&area)), Some(share(&energy))];
             (read.liberty.name.clone(), ratio, Some(both), shares)

@@ -175,8 +175,12 @@ mod tests {
     #[test]
     fn orders_of_two_axes_have_nothing_to_do_with_each_other() {
         let n = 4096;
-        let at = |axis, i| share(Design::Latin(n), 7, axis, i) - 0.5;
-        let correlation = (0..n).map(|i| at(0, i) * at(1, i)).sum::<f64>() / n as f64 * 12.0;
+        let centred_share = |axis, i| share(Design::Latin(n), 7, axis, i) - 0.5;
+        let correlation = (0..n)
+            .map(|i| centred_share(0, i) * centred_share(1, i))
+            .sum::<f64>()
+            / n as f64
+            * 12.0;
         assert!(correlation.abs() < 4.0 / (n as f64).sqrt(), "{correlation}");
     }
 }

@@ -322,8 +322,11 @@ macro_rules! fields {
 fn results() -> Vec<(String, Of)> {
     let no_depth = |reason: NoDepth| {
         let name = reason.name().replace(' ', "_").to_lowercase();
-        let of = move |t: &Taken| t.without(reason);
-        (format!("no_depth_{name}"), Of::Whole(Box::new(of)))
+        let pixels_without = move |t: &Taken| t.without(reason);
+        (
+            format!("no_depth_{name}"),
+            Of::Whole(Box::new(pixels_without)),
+        )
     };
     let number = |name: &str, unit, of| (name.to_owned(), Of::Number(unit, of));
     let mut all = vec![(
@@ -427,13 +430,13 @@ mod tests {
         let study = study(text);
         let subject = Subject::new(&study);
         let mut scratch = Scratch::default();
-        let of = |index| {
+        let key = |index| {
             subject
                 .ready(&study.point(index), &mut scratch)
                 .unwrap()
                 .key
         };
-        (0..study.len()).map(of).collect()
+        (0..study.len()).map(key).collect()
     }
 
     #[test]
@@ -488,12 +491,12 @@ mod tests {
         let ready = subject.ready(&study.point(0), &mut scratch).unwrap();
         let row = subject.compute_row(ready, &mut scratch).unwrap();
         assert_eq!(row.error, None);
-        let of = |name: &str| {
+        let number = |name: &str| {
             let at = frame_columns().iter().position(|c| c.name == name).unwrap();
             row.cells[at].number().unwrap()
         };
-        assert_eq!((of("depths"), of("counts")), (28.0, 6745.0));
-        let error_m = of("rms_error_m");
+        assert_eq!((number("depths"), number("counts")), (28.0, 6745.0));
+        let error_m = number("rms_error_m");
         assert!((error_m - 13.252_88).abs() < 1e-4, "{error_m}");
     }
 }

@@ -286,19 +286,25 @@ mod tests {
         };
         let wall = Wall::new(Rig::new(&sensor, &scene), &asked);
         let results = wall.results(&mut Last::default());
-        let of = |name: &str| {
+        let number = |name: &str| {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             results[at].number().unwrap()
         };
         let budget = scene.photon_budget(64, 64);
-        assert_eq!(of("signal_per_cycle"), budget.signal_per_pulse(120.0, 0.3));
-        assert!((of("p_detection") + of("p_miss") - 1.0).abs() < 1e-12);
-        assert_eq!(of("p_right"), of("p_detection") * of("share_in_window"));
-        assert!(of("precision_thompson_m") > 0.0 && of("precision_bound_m") > 0.0);
-        assert!((of("window_m") - 16.0 * of("bin_m")).abs() < 1e-12);
+        assert_eq!(
+            number("signal_per_cycle"),
+            budget.signal_per_pulse(120.0, 0.3)
+        );
+        assert!((number("p_detection") + number("p_miss") - 1.0).abs() < 1e-12);
+        assert_eq!(
+            number("p_right"),
+            number("p_detection") * number("share_in_window")
+        );
+        assert!(number("precision_thompson_m") > 0.0 && number("precision_bound_m") > 0.0);
+        assert!((number("window_m") - 16.0 * number("bin_m")).abs() < 1e-12);
 
         let longer = Wall {
-            laser_cycles: of("laser_cycles_for_goal") as u64,
+            laser_cycles: number("laser_cycles_for_goal") as u64,
             ..wall
         };
         let at = columns()
@@ -316,14 +322,14 @@ mod tests {
         {
             let results = Wall::new(Rig::new(&sensor, &scene), &Asked::default())
                 .results(&mut Last::default());
-            let of = |name: &str| {
+            let number = |name: &str| {
                 let at = columns().iter().position(|c| c.name == name).unwrap();
                 results[at].number().unwrap()
             };
             let metres = |ns: f64| 0.5e-9 * ns * SPEED_OF_LIGHT_M_PER_S;
-            assert!((of("bin_m") - metres(bin_ns)).abs() < 1e-9);
-            assert!((of("window_m") - metres(8.0 * bin_ns)).abs() < 1e-9);
-            assert!((of("reach_m") - metres(128.0 * step_ns)).abs() < 1e-9);
+            assert!((number("bin_m") - metres(bin_ns)).abs() < 1e-9);
+            assert!((number("window_m") - metres(8.0 * bin_ns)).abs() < 1e-9);
+            assert!((number("reach_m") - metres(128.0 * step_ns)).abs() < 1e-9);
         }
     }
 
@@ -367,7 +373,7 @@ mod tests {
     /// Pulses of 1, 2 and 4.5 ns gave the same; beyond the reach windows held the wall.
     #[test]
     fn longer_pulses_are_found_less_often_and_walls_beyond_the_reach_never() {
-        let of = |fwhm_ns: f64, range_m: f64, name: &str| {
+        let number = |fwhm_ns: f64, range_m: f64, name: &str| {
             let mut scene = Scene::outdoor();
             scene.lidar.pulse_fwhm_ns = fwhm_ns;
             let asked = Asked {
@@ -381,15 +387,16 @@ mod tests {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             wall.results(&mut Last::default())[at].number()
         };
-        let [short, usual, long] = [1.0, 2.0, 4.5].map(|fwhm_ns| of(fwhm_ns, 200.0, "p_detection"));
+        let [short, usual, long] =
+            [1.0, 2.0, 4.5].map(|fwhm_ns| number(fwhm_ns, 200.0, "p_detection"));
         assert!(
             short > usual && usual > long,
             "{short:?} {usual:?} {long:?}"
         );
-        let reach_m = of(2.0, 1.0, "reach_m").unwrap();
-        assert_eq!(of(2.0, 1.01 * reach_m, "p_right"), Some(0.0));
+        let reach_m = number(2.0, 1.0, "reach_m").unwrap();
+        assert_eq!(number(2.0, 1.01 * reach_m, "p_right"), Some(0.0));
         // Too far away for a precision: empty, not 1.7e199.
-        assert_eq!(of(2.0, 1e5, "precision_bound_m"), None);
+        assert_eq!(number(2.0, 1e5, "precision_bound_m"), None);
     }
 
     fn uniform(random: &mut Philox) -> f64 {
@@ -423,11 +430,14 @@ mod tests {
         };
         let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
         let results = wall.results(&mut Last::default());
-        let of = |name: &str| {
+        let number = |name: &str| {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             results[at].number().unwrap()
         };
-        let (signal, background) = (of("signal_per_cycle"), of("background_per_bin_cycle"));
+        let (signal, background) = (
+            number("signal_per_cycle"),
+            number("background_per_bin_cycle"),
+        );
         let bin_ns = 1e9 * wall.rig.bin_s;
         let widths_ns = [1.0 * TO_SIGMA, 3.0 * TO_SIGMA, 1.5];
         let fwhm_ns = widths_ns.map(|ns| ns * ns).iter().sum::<f64>().sqrt() / TO_SIGMA;
@@ -461,7 +471,7 @@ mod tests {
             let winner = tied[random.next_u32() as usize % tied.len()];
             right += u32::from((winner as f64 + 0.5 - at).abs() <= within);
         }
-        let (share, expected) = (f64::from(right) / f64::from(trials), of("p_detection"));
+        let (share, expected) = (f64::from(right) / f64::from(trials), number("p_detection"));
         let deviation = (expected * (1.0 - expected) / f64::from(trials)).sqrt();
         assert!((0.3..0.95).contains(&expected), "{expected} tells little");
         assert!(

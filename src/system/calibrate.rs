@@ -200,14 +200,14 @@ impl Sweeping<'_> {
 
 /// The mean of several profiles of one line, and how far a middle of theirs is from its mean at most, s.
 fn mean(lines: &[LineProfile]) -> (LineProfile, f64) {
-    let of = |values: fn(&LineProfile) -> &[f64]| -> Vec<f64> {
+    let means = |values: fn(&LineProfile) -> &[f64]| -> Vec<f64> {
         let bins = values(&lines[0]).len();
         let sum = |bin: usize| lines.iter().map(|line| values(line)[bin]).sum::<f64>();
         (0..bins).map(|bin| sum(bin) / lines.len() as f64).collect()
     };
     let mean = LineProfile {
-        middle_s: of(|line| &line.middle_s),
-        length_s: of(|line| &line.length_s),
+        middle_s: means(|line| &line.middle_s),
+        length_s: means(|line| &line.length_s),
     };
     let differences = lines.iter().flat_map(|line| {
         let pairs = line.middle_s.iter().zip(&mean.middle_s);

@@ -340,8 +340,8 @@ impl<'p> Pointing<'p> {
     fn inner_cells(&self, start: u16) -> Option<Range<usize>> {
         let (from, cell_m, cells) = self.cells;
         let inner = self.inner(start)?;
-        let at = |m: f64| (((m - from) / cell_m).round().max(0.0) as usize).min(cells);
-        let (first, end) = (at(inner.start), at(inner.end));
+        let cell = |m: f64| (((m - from) / cell_m).round().max(0.0) as usize).min(cells);
+        let (first, end) = (cell(inner.start), cell(inner.end));
         // A window that steps farther than its inner part still looks at one cell.
         Some(first..end.max((first + 1).min(cells)))
     }

@@ -419,8 +419,8 @@ mod tests {
         let is_there = |pixel: usize, measured_m: f64| {
             let (row, col) = ((pixel / 16) as f64, (pixel % 16) as f64);
             let rays = (0..64 * 64).map(|ray| {
-                let at = |n: i32| (f64::from(n) + 0.5) / 64.0;
-                let (u, v) = (col + at(ray % 64), row + at(ray / 64));
+                let phase = |n: i32| (f64::from(n) + 0.5) / 64.0;
+                let (u, v) = (col + phase(ray % 64), row + phase(ray / 64));
                 Ray::new(DVec3::ZERO, camera.at_unit_depth((u, v)))
             });
             let mut hits = rays.filter_map(|ray| scene.hit(&ray));

@@ -259,19 +259,19 @@ fn timing(bench: &Bench, recorder: &Recorder, all: &[Pulse], checks: &mut Checks
     let cut =
         delay(CellKind::Nand2, One) + delay(CellKind::Nor2, Zero) + delay(CellKind::And2, Zero);
     let last_row = bench.config.rows - 1;
-    let of = |is_last: bool| {
+    let widths = |is_last: bool| {
         let pulses = all.iter().filter(move |p| (p.row == last_row) == is_last);
         pulses.map(|p| p.fall - p.rise).collect::<Vec<Time>>()
     };
     checks.times(
         "MEMORY_LOAD width, ended by LOAD_CLK",
         half + fall - rise,
-        &of(false),
+        &widths(false),
     );
     checks.times(
         "MEMORY_LOAD width, ended by LOAD_ENABLE",
         half + cut - rise,
-        &of(true),
+        &widths(true),
     );
 
     let row_changes: Vec<Time> = recorder

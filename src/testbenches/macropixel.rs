@@ -495,25 +495,25 @@ fn cancelling_pulses(checks: &mut Checks) {
     let (law, window) = window(&config, &exposure, start);
     let centre = middle(&law, &window, 0, bin);
     let apart = Time::from_ps(500);
-    let at = |time, spad| SpadEvent { time, spad };
+    let pulse = |time, spad| SpadEvent { time, spad };
     let bin_start = law.bin_interval(&window, 0, bin).start;
     let cases = [
-        ("one pulse of a SPAD", vec![at(centre, 3)], 0, 1),
+        ("one pulse of a SPAD", vec![pulse(centre, 3)], 0, 1),
         (
             "two pulses of one SPAD within one CLK period cancel",
-            vec![at(centre - apart, 3), at(centre + apart, 3)],
+            vec![pulse(centre - apart, 3), pulse(centre + apart, 3)],
             0,
             0,
         ),
         (
             "pulses of two SPADs within one CLK period are one event",
-            vec![at(centre - apart, 3), at(centre + apart, 4)],
+            vec![pulse(centre - apart, 3), pulse(centre + apart, 4)],
             0,
             1,
         ),
         (
             "two pulses of one SPAD on either side of a bin's edge",
-            vec![at(bin_start - apart, 3), at(bin_start + apart, 3)],
+            vec![pulse(bin_start - apart, 3), pulse(bin_start + apart, 3)],
             1,
             1,
         ),

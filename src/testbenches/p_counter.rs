@@ -475,18 +475,18 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     const AFTER_BORROW: i64 = 3;
     let (config, timing) = (&bench.config, &bench.timing);
     let exposure = Exposure::new(config, 2, 1);
-    let at = |period: i64| bench.origin + exposure.falling(period);
+    let falling_clk = |period: i64| bench.origin + exposure.falling(period);
     let mut drives = bench.power_up();
     let mut cycles = Vec::new();
     let mut period = 0;
     for start in 0..=config.largest_start() as i64 {
-        drives.push(Drive::new(at(period), bench.enable, false));
-        bench.load(&mut drives, at(period), start as u64);
+        drives.push(Drive::new(falling_clk(period), bench.enable, false));
+        bench.load(&mut drives, falling_clk(period), start as u64);
         period += LOAD_PERIODS;
-        drives.push(Drive::new(at(period), bench.enable, true));
+        drives.push(Drive::new(falling_clk(period), bench.enable, true));
         for _ in 0..2 {
-            drives.push(Drive::new(at(period), bench.stop, true));
-            drives.push(Drive::new(at(period + 1), bench.stop, false));
+            drives.push(Drive::new(falling_clk(period), bench.stop, true));
+            drives.push(Drive::new(falling_clk(period + 1), bench.stop, false));
             let first = bench.first_edge(start as u64);
             cycles.extend(first.map(|first| (first, period)));
             period += first.unwrap_or(0) + AFTER_BORROW;
@@ -503,14 +503,18 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     let mut recorder = Recorder::new(counter_out.chain([bench.local_stop]));
     bench
         .kernel()
-        .run(&mut Stimulus::sorted(drives), at(period), &mut recorder)
+        .run(
+            &mut Stimulus::sorted(drives),
+            falling_clk(period),
+            &mut recorder,
+        )
         .expect("no loop of cells without delay");
 
     let mut rises = recorder.rising_edges(bench.local_stop);
     if config.after_borrow == AfterBorrow::Wrap {
         // Of each laser cycle the first: a short counter comes round before the next STOP.
         let mut last = None;
-        let cycle_of = |t: &Time| cycles.partition_point(|&(_, stop)| at(stop) <= *t);
+        let cycle_of = |t: &Time| cycles.partition_point(|&(_, stop)| falling_clk(stop) <= *t);
         rises.retain(|rise| last.replace(cycle_of(rise)) != Some(cycle_of(rise)));
     }
     let expected = cycles.len();
@@ -519,7 +523,8 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
         config.largest_start()
     );
     checks.equal(what, expected, rises.len());
-    let ripple = |(&rise, &(first, stop)): (&Time, &(i64, i64))| rise - at(stop + first + 1);
+    let ripple =
+        |(&rise, &(first, stop)): (&Time, &(i64, i64))| rise - falling_clk(stop + first + 1);
     let ripples: Vec<Time> = rises.iter().zip(&cycles).map(ripple).collect();
     let what = "ripple, CLK fall start + 1 to LOCAL_STOP, of all";
     bench.takes(what, checks, Time::ZERO, timing.ripple(), &ripples);
@@ -541,7 +546,7 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
 
     // Outputs on their way back to the start value are edges for the next stage, too.
     let last_change = |stop: i64| {
-        let stop = at(stop);
+        let stop = falling_clk(stop);
         let changes = recorder.changes();
         let until = changes.partition_point(|c| c.0 <= stop + exposure.clock.half_periods(1));
         let back = changes[..until]

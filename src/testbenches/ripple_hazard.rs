@@ -220,9 +220,9 @@ fn outcome(period: Time, policy: Policy) -> Outcome {
 /// What the right capture counts, and what one that is a period late does.
 fn expected(is_late: bool) -> Vec<Option<u64>> {
     let bins = config().bins;
-    let of = |bin: usize| if bin < bins { photons(bin) as u64 } else { 0 };
+    let bin_photons = |bin: usize| if bin < bins { photons(bin) as u64 } else { 0 };
     (0..bins)
-        .map(|bin| Some(of(bin + is_late as usize)))
+        .map(|bin| Some(bin_photons(bin + is_late as usize)))
         .collect()
 }
 

@@ -130,10 +130,10 @@ proptest! {
         };
         let timing = ChipTiming::new(&delay_line);
         // In bursts, shorter than some XORs take.
-        let at = |burst: i64, within: i64| SETTLING * 2 + Time::from_ns(2) * burst + Time::from_fs(within);
+        let pulse_time = |burst: i64, within: i64| SETTLING * 2 + Time::from_ns(2) * burst + Time::from_fs(within);
         let mut pulses: Vec<(Time, u8)> = pulses
             .into_iter()
-            .map(|(spad, burst, within)| (at(burst, within), spad % spads))
+            .map(|(spad, burst, within)| (pulse_time(burst, within), spad % spads))
             .collect();
         pulses.sort_unstable();
         let mut free_from = [Time::ZERO; 64];
@@ -150,7 +150,7 @@ proptest! {
         }
         let photons = bench.net("PHOTONS");
         let mut run = bench.start(&["PHOTONS"]);
-        run.until(at(40, 0));
+        run.until(pulse_time(40, 0));
         let mut found: Vec<Time> = run.recorder.rising_edges(photons);
         found.extend(run.recorder.falling_edges(photons));
         found.retain(|&time| time > SETTLING);
@@ -367,17 +367,17 @@ fn correlate(
     // That of 16 SPADs; a tree of 64 adds two levels and bits.
     let step = timing.clk_to_event * if spads > 16 { 2 } else { 1 };
     let conditions: Vec<_> = conditions.collect();
-    let at = |k: usize| SETTLING + step * k as i64;
+    let edge_time = |k: usize| SETTLING + step * k as i64;
     for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
-        bench.number(at(k), "SPAD_TIMED", timed);
-        bench.number(at(k), "TYPE", code as u64);
-        bench.number(at(k), "THRESHOLD", threshold as u64);
+        bench.number(edge_time(k), "SPAD_TIMED", timed);
+        bench.number(edge_time(k), "TYPE", code as u64);
+        bench.number(edge_time(k), "THRESHOLD", threshold as u64);
     }
     let event = bench.net("SPAD_EVENT");
     let mut run = bench.start(&["SPAD_EVENT"]);
     for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
         let expected = correlation::model(timed, TYPES[code as usize], threshold);
-        let found = run.is_high_at(at(k + 1) - Time::from_fs(1), event);
+        let found = run.is_high_at(edge_time(k + 1) - Time::from_fs(1), event);
         assert_eq!(
             found,
             Some(expected),

@@ -133,8 +133,8 @@ proptest! {
                 (left > Time::ZERO).then_some(left)
             }).unwrap()
         };
-        let at = |share: f64| Time::from_fs((share * exposure.end().as_fs() as f64) as i64);
-        let pulses = pulses.into_iter().map(|(spad, share)| (at(share), spad));
+        let time_at_share = |share: f64| Time::from_fs((share * exposure.end().as_fs() as f64) as i64);
+        let pulses = pulses.into_iter().map(|(spad, share)| (time_at_share(share), spad));
         let pulses = clear(pulses.collect(), &timing, config.dead_time(), to_next_edge);
         let events: Vec<SpadEvent> = pulses.iter().map(|&(time, spad)| SpadEvent { time, spad }).collect();
         let sensor = Sensor::from(&config);

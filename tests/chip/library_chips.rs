@@ -52,7 +52,7 @@ fn text_of(path: &Path) -> Option<String> {
 
 /// The QuantIC4x4 with every P-counter, and HSLIDAR in both modes.
 pub fn chips() -> Vec<SensorConfig> {
-    let of = |p_counter: PCounter| SensorConfig {
+    let chip = |p_counter: PCounter| SensorConfig {
         p_counter,
         after_borrow: if p_counter.row().has_memory {
             AfterBorrow::Hold
@@ -61,7 +61,7 @@ pub fn chips() -> Vec<SensorConfig> {
         },
         ..SensorConfig::default()
     };
-    let mut chips: Vec<SensorConfig> = PCounter::ALL.into_iter().map(of).collect();
+    let mut chips: Vec<SensorConfig> = PCounter::ALL.into_iter().map(chip).collect();
     // With a shift register: OpenSTA asks less behind the exclusive ORs of the counter TDC's adders than we do.
     let hslidar = SensorConfig {
         tdc: Tdc::Clocked,

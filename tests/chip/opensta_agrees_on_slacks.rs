@@ -177,13 +177,13 @@ fn theirs(report: &str, own_pins: &BTreeMap<String, String>) -> Checks {
             .filter(|line| line.contains("edge)"))
             .filter_map(|line| line.split_whitespace().nth(1)?.parse().ok())
             .collect();
-        let of = |what: &str| {
+        let block_number = |what: &str| {
             let mut lines = block.lines().filter(|line| line.contains(what));
             lines.next()?.split_whitespace().next()?.parse::<f64>().ok()
         };
         let high = block.contains("width (high)");
         let (Some(slack), Some(cell), [open, close]) =
-            (of("slack"), own_pins.get(&pin), &edges[..])
+            (block_number("slack"), own_pins.get(&pin), &edges[..])
         else {
             continue;
         };

@@ -76,14 +76,14 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
     let config = sensor(p_counter);
     let mut bench = counter(&config);
     let start = |load: u64| load.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 55;
-    let at = |load: u64| SETTLING * (3 + 4 * load as i64);
+    let load_time = |load: u64| SETTLING * (3 + 4 * load as i64);
     for load in 0..LOADS {
-        bench.number(at(load), "COUNTER_INIT", start(load));
-        bench.pulse(at(load) + SETTLING, SETTLING, "MEMORY_LOAD");
+        bench.number(load_time(load), "COUNTER_INIT", start(load));
+        bench.pulse(load_time(load) + SETTLING, SETTLING, "MEMORY_LOAD");
         let reset = if holds_reset {
-            (at(load), SETTLING * 3)
+            (load_time(load), SETTLING * 3)
         } else {
-            (at(load), Time::from_ns(1))
+            (load_time(load), Time::from_ns(1))
         };
         bench.pulse(reset.0, reset.1, "COUNTER_RESET");
     }
@@ -92,7 +92,7 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
     let mut run = bench.start(&["LOCAL_STOP"]);
     let is_wrong = |&load: &u64| {
         let model = p_counter::Model::new(&config, start(load) as u16);
-        run.number_at(at(load + 1) - Time::from_fs(1), out) != Some(model.counter_out())
+        run.number_at(load_time(load + 1) - Time::from_fs(1), out) != Some(model.counter_out())
     };
     let wrong = (0..LOADS).filter(is_wrong).count();
     (wrong, run.recorder.rising_edges(local_stop).len())

@@ -110,13 +110,15 @@ pub struct Drawn {
 
 /// Number `which` of all kinds with all that they might hide; `random` decides the rest.
 pub fn drawn(which: usize, random: &mut StdRng) -> Drawn {
-    let of = |kind: Kind| match kind {
+    let hidden_states = |kind: Kind| match kind {
         Kind::Memoryless => &Hidden::WITHOUT[..],
         _ => &Hidden::WITH_MEMORY[..],
     };
-    let all = Kind::ALL
-        .into_iter()
-        .flat_map(|kind| of(kind).iter().map(move |&hidden| (kind, hidden)));
+    let all = Kind::ALL.into_iter().flat_map(|kind| {
+        hidden_states(kind)
+            .iter()
+            .map(move |&hidden| (kind, hidden))
+    });
     let all: Vec<(Kind, Hidden)> = all.collect();
     let (kind, hidden) = all[which % all.len()];
     let has_memory = kind != Kind::Memoryless;

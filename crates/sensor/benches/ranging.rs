@@ -187,13 +187,13 @@ fn main() {
             writeln!(places, "{};{number};{place:?}", kind.name).expect("text");
         }
         times.sort_by(f64::total_cmp);
-        let at = |share: f64| times[(share * (times.len() - 1) as f64) as usize];
+        let quantile = |share: f64| times[(share * (times.len() - 1) as f64) as usize];
         println!(
             "{:42} {:8.1} {:8.1} {:8.1}  {bounded}",
             kind.name,
-            at(0.5),
-            at(0.99),
-            at(1.0)
+            quantile(0.5),
+            quantile(0.99),
+            quantile(1.0)
         );
     }
     if let Some(file) = file {

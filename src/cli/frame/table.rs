@@ -19,24 +19,24 @@ pub(super) fn brief(
     frame: &Frame,
 ) -> Table {
     let summary = frame.summary();
-    let of = |part: usize, whole: usize| format!("{part} of {whole}");
+    let part_of_whole = |part: usize, whole: usize| format!("{part} of {whole}");
     let with_surface = summary.depths - summary.depths_without_surface;
     let mut table = Table::new(format!("Frame of {}", scene_name(args)))
         .row(
             "macropixels that see a surface",
-            of(summary.with_target, summary.pixels),
+            part_of_whole(summary.with_target, summary.pixels),
         )
         .row(
             "windows that hold their surface",
-            of(summary.in_window, summary.guided),
+            part_of_whole(summary.in_window, summary.guided),
         )
         .row(
             "surfaces with a depth",
-            of(with_surface, summary.with_target),
+            part_of_whole(with_surface, summary.with_target),
         )
         .row(
             format!("depths off by more than a bin ({:.2} m)", summary.bin_m),
-            of(summary.outliers, with_surface),
+            part_of_whole(summary.outliers, with_surface),
         );
     if let Some(error_m) = summary.median_absolute_error_m {
         table.push("median error of these depths", format!("{error_m:.3} m"));
@@ -134,13 +134,13 @@ pub(super) fn push_details(
     frame: &Frame,
 ) {
     let summary = frame.summary();
-    let of = |part: usize, whole: usize| format!("{part} of {whole}");
+    let part_of_whole = |part: usize, whole: usize| format!("{part} of {whole}");
     table.push(
         match settings.sensor.mode {
             Mode::Guided => "guided",
             Mode::Conventional => "with the one window of the conventional mode",
         },
-        of(summary.guided, summary.pixels),
+        part_of_whole(summary.guided, summary.pixels),
     );
     if !args.exposure.guiding.guides.is_empty() {
         table.push("guide", settings.guide.name());
@@ -164,7 +164,7 @@ pub(super) fn push_details(
     let skipped = work.skipped_dark + work.skipped_closed;
     table.push(
         "simulated: macropixels",
-        of((work.macropixels - skipped) as usize, summary.pixels),
+        part_of_whole((work.macropixels - skipped) as usize, summary.pixels),
     );
     if let Some(kept) = &frame.kept {
         table.push(

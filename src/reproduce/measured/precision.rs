@@ -125,10 +125,10 @@ fn trial(signal: f64) -> Trial {
 pub fn by_formula(trial: &Trial) -> (f64, f64) {
     let cycles = f64::from(trial.cycles);
     let (background, signal) = (cycles * trial.background(), cycles * trial.signal);
-    let of = |formula: fn(f64, f64, f64, f64) -> f64| {
+    let bound = |formula: fn(f64, f64, f64, f64) -> f64| {
         formula(trial.bin_ns(), trial.sigma_ns, background, signal)
     };
-    (of(thompson), of(cramer_rao))
+    (bound(thompson), bound(cramer_rao))
 }
 
 fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {

@@ -194,15 +194,15 @@ pub(in crate::reproduce) fn figure_45() -> Chart {
 pub(in crate::reproduce) fn figure_108() -> Chart {
     let chart = schemes(108, demonstrator_on_chip(), 80);
     let lines = demonstrator_on_delay_lines();
-    let at = |cycles: f64| [(lines.range_m, cycles)];
+    let point = |cycles: f64| [(lines.range_m, cycles)];
     chart
         .points(
             "guided in delay-line bins, measured",
-            at(lines.guided.cycles.value),
+            point(lines.guided.cycles.value),
         )
         .points(
             "sliding in delay-line bins, measured",
-            at(lines.sliding().value),
+            point(lines.sliding().value),
         )
 }
 

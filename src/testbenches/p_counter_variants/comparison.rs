@@ -52,10 +52,10 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
         row.check(p_counter.name(), checks);
         grid.push(row.cells(p_counter.name()));
     }
-    let of = |p_counter: PCounter| &rows[p_counter as usize];
-    let ripple = of(PCounter::Ripple);
-    let synchronous = of(PCounter::Synchronous);
-    let segmented = of(PCounter::Segmented);
+    let variant_row = |p_counter: PCounter| &rows[p_counter as usize];
+    let ripple = variant_row(PCounter::Ripple);
+    let synchronous = variant_row(PCounter::Synchronous);
+    let segmented = variant_row(PCounter::Segmented);
     checks.that(
         "a synchronous counter avoids the ripple's limit (4.6): shortest CLK period",
         format!("below {}, ripple's", shown(ripple.period.0)),

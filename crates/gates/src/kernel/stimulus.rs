@@ -133,9 +133,9 @@ mod tests {
     #[test]
     fn streams_merge_in_time_order_and_ties_in_stream_order() {
         let net = NetId::new;
-        let at = |fs, n, v| Drive::new(Time::from_fs(fs), net(n), v);
-        let a = [at(0, 0, true), at(5, 0, false)];
-        let b = [at(0, 1, true), at(3, 1, false)];
+        let drive = |fs, n, v| Drive::new(Time::from_fs(fs), net(n), v);
+        let a = [drive(0, 0, true), drive(5, 0, false)];
+        let b = [drive(0, 1, true), drive(3, 1, false)];
         let merged: Vec<_> = Stimulus::new(a)
             .with_drives(b)
             .map(|d| (d.time.as_fs(), d.net.index()))

@@ -194,11 +194,15 @@ impl Characterised {
     ) -> [f64; 2] {
         let first = netlist.cells_of(scope).start;
         let cells = first..first + netlist.scopes()[scope].module.total_cells();
-        let of = |net: Option<NetId>| net.map_or(0.0, &changes);
+        let toggles = |net: Option<NetId>| net.map_or(0.0, &changes);
         let each = cells.map(|cell| {
             let (composite, conditions) = self.instance(netlist, &library.map, cell);
             let leaf = &netlist.cells()[cell];
-            composite.energy_fj(&conditions, leaf.inputs.map(of), leaf.outputs.map(of))
+            composite.energy_fj(
+                &conditions,
+                leaf.inputs.map(toggles),
+                leaf.outputs.map(toggles),
+            )
         });
         let sum = each.fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         [sum[0] * 1e-15, sum[1] * volt * volt * 1e-15]

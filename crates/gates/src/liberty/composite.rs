@@ -252,7 +252,7 @@ impl<'m> Composite<'m> {
         for stage in self.used() {
             let (cell, sources) = (self.cell(stage), &self.recipe.stages[stage].sources);
             // Changes of a pin, and its slew.
-            let at = |pin: usize, changes: &[f64; PLACES]| {
+            let changes_and_slew = |pin: usize, changes: &[f64; PLACES]| {
                 let place = place(sources[pin]);
                 let slew = place.and_then(|at| slews[at]).unwrap_or_default();
                 (
@@ -263,7 +263,7 @@ impl<'m> Composite<'m> {
             let mean = |to, only: Option<usize>, load, changes: &[f64; PLACES]| {
                 let ours = |e: &&CellEnergy| e.to == to && (only.is_none() || e.from == only);
                 let each = cell.energies.iter().filter(ours).map(|energy| {
-                    let (weight, slew) = at(energy.from.unwrap_or(0), changes);
+                    let (weight, slew) = changes_and_slew(energy.from.unwrap_or(0), changes);
                     let [rise, fall] = energy
                         .of
                         .each_ref()
@@ -292,7 +292,7 @@ impl<'m> Composite<'m> {
                 let pin = pins.find(|((source, connected), _)| **source == from && *connected);
                 let count = match pin {
                     Some((_, count)) => count,
-                    None if sources.len() == 1 => at(0, &changes).0,
+                    None if sources.len() == 1 => changes_and_slew(0, &changes).0,
                     None => shown,
                 };
                 let load = self.output_load(stage, output, &conditions.loads);
@@ -302,7 +302,7 @@ impl<'m> Composite<'m> {
                 changes[MAX_INPUTS + 2 * stage + output] = count;
             }
             for pin in 0..sources.len() {
-                within += at(pin, &changes).0 * mean(None, Some(pin), 0.0, &changes);
+                within += changes_and_slew(pin, &changes).0 * mean(None, Some(pin), 0.0, &changes);
             }
         }
         [within, loads]

@@ -211,18 +211,21 @@ mod tests {
     #[test]
     fn operators_bind_as_liberty_says() {
         let table = |text| truth_table(text, &["A", "B", "S"]).unwrap();
-        let of = |value: fn(bool, bool, bool) -> bool| {
+        let expected = |value: fn(bool, bool, bool) -> bool| {
             TruthTable::from_fn(3, |i| value(i & 1 == 1, i & 2 != 0, i & 4 != 0))
         };
-        assert_eq!(table("(A*B)+(!S)"), of(|a, b, s| a & b | !s));
-        assert_eq!(table("A & !S | B S"), of(|a, b, s| a & !s | b & s));
-        assert_eq!(table("A' + B ^ S A"), of(|a, b, s| !a | (b ^ (s & a))));
-        assert_eq!(table("(!(S))"), of(|_, _, s| !s));
-        assert_eq!(table("1"), of(|_, _, _| true));
-        assert_eq!(table("0"), of(|_, _, _| false));
-        assert_eq!(table("A 0 + B"), of(|_, b, _| b));
+        assert_eq!(table("(A*B)+(!S)"), expected(|a, b, s| a & b | !s));
+        assert_eq!(table("A & !S | B S"), expected(|a, b, s| a & !s | b & s));
+        assert_eq!(
+            table("A' + B ^ S A"),
+            expected(|a, b, s| !a | (b ^ (s & a)))
+        );
+        assert_eq!(table("(!(S))"), expected(|_, _, s| !s));
+        assert_eq!(table("1"), expected(|_, _, _| true));
+        assert_eq!(table("0"), expected(|_, _, _| false));
+        assert_eq!(table("A 0 + B"), expected(|_, b, _| b));
         let quoted = truth_table(r#"\"1\" !\"B 2\" S"#, &["1", "B 2", "S"]);
-        assert_eq!(quoted, Some(of(|a, b, s| a & !b & s)));
+        assert_eq!(quoted, Some(expected(|a, b, s| a & !b & s)));
         // As many inputs as a table has.
         let names = ["A", "B", "C", "D", "E", "F", "G"];
         let tables = [6, 7].map(|n| truth_table("A", &names[..n]).is_some());

@@ -218,11 +218,15 @@ mod tests {
     #[test]
     fn values_between_and_beyond_the_marks_are_on_straight_lines() {
         let delay = table("cell_rise (t) { values (\"1, 2\", \"3, 6\"); }").unwrap();
-        let at = |slew_ns: f64, load_pf: f64| delay.interpolate(slew_ns * 1e6, load_pf * 1e3) / 1e6;
-        assert_eq!((at(0.0, 1.0), at(10.0, 1.0), at(0.0, 3.0)), (1.0, 2.0, 3.0));
-        assert_eq!(at(5.0, 2.0), 3.0);
-        assert_eq!(at(0.0, 5.0), 5.0);
-        assert_eq!(at(-10.0, 1.0), 0.0);
+        let delay_ns =
+            |slew_ns: f64, load_pf: f64| delay.interpolate(slew_ns * 1e6, load_pf * 1e3) / 1e6;
+        assert_eq!(
+            (delay_ns(0.0, 1.0), delay_ns(10.0, 1.0), delay_ns(0.0, 3.0)),
+            (1.0, 2.0, 3.0)
+        );
+        assert_eq!(delay_ns(5.0, 2.0), 3.0);
+        assert_eq!(delay_ns(0.0, 5.0), 5.0);
+        assert_eq!(delay_ns(-10.0, 1.0), 0.0);
         let one = table("cell_rise (scalar) { values (\"7\"); }").unwrap();
         assert_eq!(one.interpolate(3.0, 4.0), 7e6);
     }

@@ -194,14 +194,14 @@ mod tests {
         m.cell("flip_flop", CellKind::Dffr, &pins, &[Some(q), None]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let library = Library::generic_40nm();
-        let of = |library: &Library| Timing::nominal(&netlist, library, Corner::Typ);
+        let timing = |library: &Library| Timing::nominal(&netlist, library, Corner::Typ);
         let (slow, derated) = (
-            varied(&netlist, &of(&library), 1.5, None),
-            of(&derated_limits(&library, 1.5)),
+            varied(&netlist, &timing(&library), 1.5, None),
+            timing(&derated_limits(&library, 1.5)),
         );
         let limits = |timing: &Timing| *timing.limits(0, CellKind::Dffr);
         assert_eq!(limits(&slow), limits(&derated));
-        assert_ne!(limits(&slow), limits(&of(&library)));
+        assert_ne!(limits(&slow), limits(&timing(&library)));
     }
 
     #[test]

@@ -270,11 +270,11 @@ mod tests {
             let differing = [Control::Reset, Control::Set].iter().flat_map(|&control| {
                 let all = Check::ALL.iter().map(move |&check| (control, check));
                 all.filter(|&(control, check)| {
-                    let at = |limits: &InstanceLimits| {
+                    let both_edges = |limits: &InstanceLimits| {
                         limits.limit_fs(control, check, Edge::Rise)
                             ^ limits.limit_fs(control, check, Edge::Fall) << 16
                     };
-                    at(&limits) != at(&nominal)
+                    both_edges(&limits) != both_edges(&nominal)
                 })
             });
             let alone = !text.contains("RECREM") && !text.contains("SETUPHOLD");

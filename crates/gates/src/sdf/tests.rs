@@ -86,17 +86,17 @@ fn inv(delays: &str) -> String {
 
 #[test]
 fn one_value_serves_both_directions_and_missing_ones_change_nothing() {
-    let of = |delays: &str| {
+    let inverter_arc = |delays: &str| {
         arc(
             &inv(&format!("(ABSOLUTE (IOPATH A Z {delays}))")),
             "u1.inv",
             0,
         )
     };
-    assert_eq!(of("(0.12:0.15:0.2)"), (150, 150));
-    assert_eq!(of("(0.12::0.2)"), (21_013, 18_979));
-    assert_eq!(of("() (1e1)"), (21_013, 10_000));
-    assert_eq!(of("((1:2:3) (4:5:6)) (7) (8)"), (2_000, 7_000));
+    assert_eq!(inverter_arc("(0.12:0.15:0.2)"), (150, 150));
+    assert_eq!(inverter_arc("(0.12::0.2)"), (21_013, 18_979));
+    assert_eq!(inverter_arc("() (1e1)"), (21_013, 10_000));
+    assert_eq!(inverter_arc("((1:2:3) (4:5:6)) (7) (8)"), (2_000, 7_000));
     let twice = "(ABSOLUTE (IOPATH A Z (1) (2))) (INCREMENT (IOPATH A Z (0.5) (-1)))";
     assert_eq!(arc(&inv(twice), "u1.inv", 0), (1_500, 1_000));
     let increment = "(INCREMENT (IOPATH A Z (1)))";

@@ -222,10 +222,10 @@ mod tests {
         for hz in [0.5, 2e12] {
             assert_eq!(Frequency::from_hz_f64(hz), Err(OutOfRange(hz)));
         }
-        let of = |fs| Frequency::from_period(Time::from_fs(fs));
-        assert_eq!(of(0), Err(NotPositive(f64::INFINITY)));
-        assert_eq!(of(-4), Err(NotPositive(-2.5e14)));
-        assert_eq!(of(500), Err(OutOfRange(2e12)));
+        let from_period_fs = |fs| Frequency::from_period(Time::from_fs(fs));
+        assert_eq!(from_period_fs(0), Err(NotPositive(f64::INFINITY)));
+        assert_eq!(from_period_fs(-4), Err(NotPositive(-2.5e14)));
+        assert_eq!(from_period_fs(500), Err(OutOfRange(2e12)));
         assert_eq!(Frequency::from_hz_f64(1.5).unwrap().as_hz(), 1.5);
     }
 

@@ -11,7 +11,7 @@ use crate::units::Time;
 /// A module `m` of one cell, whose pins are ports of its own names.
 fn cell(kind: &str, inputs: &[&str], output: &str) -> String {
     let all: Vec<&str> = inputs.iter().copied().chain([output]).collect();
-    let of = |entry: &dyn Fn(usize, &str) -> String| -> String {
+    let joined = |entry: &dyn Fn(usize, &str) -> String| -> String {
         let entries: Vec<String> = all
             .iter()
             .enumerate()
@@ -19,11 +19,11 @@ fn cell(kind: &str, inputs: &[&str], output: &str) -> String {
             .collect();
         entries.join(", ")
     };
-    let ports = of(&|i, pin| {
+    let ports = joined(&|i, pin| {
         let direction = if pin == output { "output" } else { "input" };
         format!(r#""{pin}": {{"direction": "{direction}", "bits": [{i}]}}"#)
     });
-    let pins = of(&|i, pin| format!(r#""{pin}": [{i}]"#));
+    let pins = joined(&|i, pin| format!(r#""{pin}": [{i}]"#));
     let cell = format!(r#"{{"type": "{kind}", "connections": {{{pins}}}}}"#);
     format!(r#"{{"modules": {{"m": {{"ports": {{{ports}}}, "cells": {{"it": {cell}}}}}}}}}"#)
 }
@@ -170,14 +170,14 @@ fn flip_flops_do_what_their_names_say() {
             bench.set(&first, "Q");
             // What the state becomes; `before` is that of the last step.
             let step = |state, before: &HashMap<&str, bool>, values: &HashMap<&str, bool>| {
-                let of = |pin: &str, values: &HashMap<&str, bool>| {
+                let is_active = |pin: &str, values: &HashMap<&str, bool>| {
                     let at = pins.find(pin)?;
                     Some(values[pin] == high(at))
                 };
-                let is = |pin| of(pin, values).unwrap_or(false);
-                let is_enabled = of("E", values).unwrap_or(true);
+                let is = |pin| is_active(pin, values).unwrap_or(false);
+                let is_enabled = is_active("E", values).unwrap_or(true);
                 let to = Some(pins.find('0').is_some_and(high));
-                let rises = !of("C", before).unwrap() && of("C", values).unwrap();
+                let rises = !is_active("C", before).unwrap() && is_active("C", values).unwrap();
                 let is_sync = family.starts_with('S');
                 if is("L") {
                     Some(values["AD"])

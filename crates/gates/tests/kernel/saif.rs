@@ -167,7 +167,7 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
     let mut pulses = vec![0; of_net.len()];
     for (index, cell) in netlist.cells().iter().enumerate() {
         let pins: Vec<NetId> = cell.input_nets().collect();
-        let at = |net: NetId, time: i64| {
+        let net_value = |net: NetId, time: i64| {
             let changes = &of_net[net.index()];
             let until = changes.partition_point(|change| change.0 <= time);
             until.checked_sub(1).map_or(Logic::X, |k| changes[k].1)
@@ -181,7 +181,8 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
             let mut last = Logic::X;
             let mut on_their_way: Vec<(i64, Logic)> = Vec::new();
             for &time in &times {
-                let value = |pin: usize, time| pins.get(pin).map_or(Logic::Zero, |&p| at(p, time));
+                let value =
+                    |pin: usize, time| pins.get(pin).map_or(Logic::Zero, |&p| net_value(p, time));
                 let now = [0, 1, 2, 3].map(|pin| value(pin, time));
                 let next = match (cell.kind.is_flip_flop(), which) {
                     (false, _) => cell.kind.output(now),
@@ -206,7 +207,9 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
                     DelayModel::Transport => on_their_way.partition_point(|&(t, _)| t < due),
                 };
                 let dropped = on_their_way.split_off(stays);
-                let before = on_their_way.last().map_or(at(output, time), |&(_, v)| v);
+                let before = on_their_way
+                    .last()
+                    .map_or(net_value(output, time), |&(_, v)| v);
                 let values: Vec<Logic> = [before]
                     .into_iter()
                     .chain(dropped.into_iter().map(|(_, value)| value))

@@ -287,18 +287,18 @@ impl ResultSet {
         manifest.write(&after)?;
 
         let _undisturbed = Registry::lock();
-        let at = |name: &str| self.folder.join(name);
+        let path = |name: &str| self.folder.join(name);
         for (name, other) in &switch.set_aside {
-            fs::rename(at(name), at(other))?;
+            fs::rename(path(name), path(other))?;
         }
-        fs::rename(&during, at(MANIFEST))?;
+        fs::rename(&during, path(MANIFEST))?;
         for ManifestFile { name, .. } in &files {
-            fs::rename(staging.join(name), at(name))?;
+            fs::rename(staging.join(name), path(name))?;
         }
         for name in &switch.remove {
-            fs::remove_file(at(name))?;
+            fs::remove_file(path(name))?;
         }
-        fs::rename(&after, at(MANIFEST))
+        fs::rename(&after, path(MANIFEST))
     }
 }
 
@@ -356,13 +356,13 @@ impl Switch {
     }
 
     fn sentences(&self, folder: &Path) -> Vec<String> {
-        let at = |name: &String| folder.join(name).display().to_string();
+        let shown_path = |name: &String| folder.join(name).display().to_string();
         let set_aside = (self.set_aside.iter())
             .map(|(name, other)| set_aside_sentence(&folder.join(name), &folder.join(other)));
         let kept = self.kept.iter().map(|name| {
             format!(
                 "{} has been changed since an earlier run wrote it, and was kept; it is none of these results",
-                at(name)
+                shown_path(name)
             )
         });
         set_aside.chain(kept).collect()

@@ -31,9 +31,9 @@ pub fn crossing(points: &[Point], level: f64) -> Option<Estimate> {
     let start = {
         let share = |p: &Point| (p.successes + 0.5) / (p.trials + 1.0);
         let (first, last) = (points.first()?, points.last()?);
-        let of = |p: &Point| standard.inverse_cdf(share(p));
-        let slope = (of(last) - of(first)) * scale / (last.x - first.x);
-        (of(first) - slope * (first.x - middle) / scale, slope)
+        let probit = |p: &Point| standard.inverse_cdf(share(p));
+        let slope = (probit(last) - probit(first)) * scale / (last.x - first.x);
+        (probit(first) - slope * (first.x - middle) / scale, slope)
     };
     let (mut a, mut b) = start;
     let mut inverse = [0.0; 3];
@@ -71,12 +71,12 @@ pub fn crossing(points: &[Point], level: f64) -> Option<Estimate> {
     }
     let u = (standard.inverse_cdf(level) - a) / b;
     let variance = (inverse[0] + 2.0 * u * inverse[1] + u * u * inverse[2]) / (b * b);
-    let at = |u: f64| middle + scale * u;
+    let place = |u: f64| middle + scale * u;
     let half = Z_95 * variance.sqrt();
     Some(Estimate {
-        value: at(u),
-        low: at(u - half),
-        high: at(u + half),
+        value: place(u),
+        low: place(u - half),
+        high: place(u + half),
     })
 }
 

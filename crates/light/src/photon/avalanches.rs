@@ -352,7 +352,7 @@ mod tests {
     #[test]
     fn a_photon_after_a_dead_time_of_darkness_is_known() {
         let model = SpadModel::with_dead_time(Time::from_fs(100));
-        let at = |time_fs| Photon::new(Time::from_fs(time_fs), 3, false);
+        let photon = |time_fs| Photon::new(Time::from_fs(time_fs), 3, false);
         let run = |photons: &[Photon], wanted_from| {
             let from = Time::from_fs(1_000);
             let mut avalanches =
@@ -362,11 +362,17 @@ mod tests {
             let known = avalanches.run(photons, None, forever, wanted, &mut edges);
             known.map(|()| edges.len())
         };
-        assert_eq!(run(&[at(1_100)], 0), Ok(1));
-        assert_eq!(run(&[at(1_099)], 0), Err(Unknown));
+        assert_eq!(run(&[photon(1_100)], 0), Ok(1));
+        assert_eq!(run(&[photon(1_099)], 0), Err(Unknown));
         // The second one is lost or not, the third one comes late enough.
-        assert_eq!(run(&[at(1_050), at(1_120), at(1_221)], 1_200), Ok(1));
-        assert_eq!(run(&[at(1_050), at(1_120), at(1_220)], 1_200), Err(Unknown));
+        assert_eq!(
+            run(&[photon(1_050), photon(1_120), photon(1_221)], 1_200),
+            Ok(1)
+        );
+        assert_eq!(
+            run(&[photon(1_050), photon(1_120), photon(1_220)], 1_200),
+            Err(Unknown)
+        );
     }
 
     /// The rules, one SPAD at a time, straight from their wording.

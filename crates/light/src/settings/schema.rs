@@ -44,8 +44,8 @@ pub fn schema(title: &str, sections: &[Section], values: &Table) -> Value {
 }
 
 fn keys(keys: &[Key], values: &Table) -> Map<String, Value> {
-    let of = |key: &Key| (key.name.to_owned(), of_key(key, values.get(key.name)));
-    keys.iter().map(of).collect()
+    let entry = |key: &Key| (key.name.to_owned(), of_key(key, values.get(key.name)));
+    keys.iter().map(entry).collect()
 }
 
 fn of_key(key: &Key, value: Option<&toml::Value>) -> Value {

@@ -317,9 +317,9 @@ mod tests {
     #[test]
     fn very_bright_echoes_are_found_photon_by_photon_and_are_a_lot_in_full_bins() {
         for signal in [100.0, 1e4, 1e8] {
-            let of = |hits| echo(signal, 0.1, 0.3).detection(200, hits);
-            assert!(of(Hits::All).probability > 0.999_999, "{signal}");
-            let full = of(Hits::OneACycle);
+            let detection = |hits| echo(signal, 0.1, 0.3).detection(200, hits);
+            assert!(detection(Hits::All).probability > 0.999_999, "{signal}");
+            let full = detection(Hits::OneACycle);
             assert!(
                 full.probability > 0.3 && full.probability <= 1.0,
                 "{signal} {full:?}"
@@ -344,8 +344,11 @@ mod tests {
     fn laser_cycles_are_the_fewest() {
         let echo = echo(0.02, 0.05, 0.6);
         let cycles = echo.laser_cycles_for(0.99, Hits::OneACycle).unwrap();
-        let of = |cycles| echo.detection(cycles, Hits::OneACycle).probability;
-        assert!(of(cycles) >= 0.99 && of(cycles - 1) < 0.99, "{cycles}");
+        let probability = |cycles| echo.detection(cycles, Hits::OneACycle).probability;
+        assert!(
+            probability(cycles) >= 0.99 && probability(cycles - 1) < 0.99,
+            "{cycles}"
+        );
         assert_eq!(
             SpreadEcho {
                 signal: 0.0,

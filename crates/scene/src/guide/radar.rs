@@ -92,8 +92,8 @@ impl Radar {
     /// What comes back within a beam.
     fn echoes(&self, stage: &Stage, (col, row): (i32, i32)) -> Vec<Echo> {
         let angles = |beam: i32, width_deg: f64| {
-            let at = move |n: u32| (f64::from(n) + 0.5) / f64::from(RAYS_ACROSS) - 0.5;
-            (0..RAYS_ACROSS).map(move |n| ((f64::from(beam) + at(n)) * width_deg).to_radians())
+            let offset = move |n: u32| (f64::from(n) + 0.5) / f64::from(RAYS_ACROSS) - 0.5;
+            (0..RAYS_ACROSS).map(move |n| ((f64::from(beam) + offset(n)) * width_deg).to_radians())
         };
         let rays = angles(row, self.elevation_beam_deg).flat_map(|elevation| {
             angles(col, self.azimuth_beam_deg).map(move |azimuth| {

@@ -353,8 +353,12 @@ mod tests {
     fn clouds_are_smooth_and_as_strong_as_is_said() {
         let mut squares = [0.0; 3];
         for number in 0..10_000 {
-            let at = |n: u32| f64::from(n * 7919 % 10_007) * 0.0371 - 150.0;
-            let point = DVec3::new(at(number), at(number + 3), at(number + 7));
+            let coordinate = |n: u32| f64::from(n * 7919 % 10_007) * 0.0371 - 150.0;
+            let point = DVec3::new(
+                coordinate(number),
+                coordinate(number + 3),
+                coordinate(number + 7),
+            );
             let here = cloud(point, 5);
             assert!(here.abs() <= 1.0);
             for axis in [DVec3::X, DVec3::Y, DVec3::Z] {

@@ -82,22 +82,22 @@ mod tests {
 
     #[test]
     fn errors_move_the_image_the_way_their_names_say() {
-        let at = |stereo: Stereo| {
+        let image_point = |stereo: Stereo| {
             let ahead = DVec3::new(1.0, 0.0, 40.0);
             RightCamera::new(&stereo).sees_at(ahead).unwrap()
         };
         let none = Stereo::default();
-        assert_eq!(at(none), (720.0, 540.0));
+        assert_eq!(image_point(none), (720.0, 540.0));
         // Turned outwards, to the right, it sees everything further left.
         assert!(
-            at(Stereo {
+            image_point(Stereo {
                 yaw_error_deg: 0.1,
                 ..none
             })
             .0 < 719.0
         );
         assert!(
-            at(Stereo {
+            image_point(Stereo {
                 baseline_error_m: 0.1,
                 ..none
             })
@@ -105,7 +105,7 @@ mod tests {
         );
         // Turned up it sees everything further down.
         assert!(
-            at(Stereo {
+            image_point(Stereo {
                 pitch_error_deg: 0.1,
                 ..none
             })

@@ -132,7 +132,7 @@ mod tests {
     fn bounced(scene: &Scene, across: u32) -> Vec<(f64, f64, f64)> {
         let truth = GroundTruth::render(scene, across, across);
         let budget = scene.photon_budget(across, across);
-        let of = |view: &std::sync::Arc<crate::scene::view::View>| {
+        let photons = |view: &std::sync::Arc<crate::scene::view::View>| {
             let all: f64 = view.bounced.iter().map(|b| b.exposure_j_m2).sum();
             let ways = view.bounced.iter().map(|b| b.exposure_j_m2 * b.way_m);
             let direct = view.glimpses.iter();
@@ -143,7 +143,7 @@ mod tests {
                 ways.sum::<f64>() / all,
             )
         };
-        truth.views.iter().map(of).collect()
+        truth.views.iter().map(photons).collect()
     }
 
     /// In a sphere about the lidar every place gets ρ of the pulse over the whole surface, wherever the laser shines: a ray from any place of a

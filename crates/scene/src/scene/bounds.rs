@@ -214,13 +214,13 @@ mod tests {
             let (stage, bounds) = (Stage::new(&scene), Bounds::from_scene(&scene, DVec3::ZERO));
             let camera = scene.lidar_camera(6, 5);
             for (row, col) in (0..6).flat_map(|row| (0..5).map(move |col| (row, col))) {
-                let at = |du: f64, dv: f64| {
+                let ray_direction = |du: f64, dv: f64| {
                     camera.at_unit_depth((f64::from(col) + du, f64::from(row) + dv)).normalize()
                 };
-                let middle = at(0.5, 0.5);
-                let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
+                let middle = ray_direction(0.5, 0.5);
+                let corners = [ray_direction(0.0, 0.0), ray_direction(0.0, 1.0), ray_direction(1.0, 0.0), ray_direction(1.0, 1.0)];
                 let candidates = bounds.about(Cone::about(middle, corners));
-                for direction in corners.into_iter().chain([middle, at(0.2, 0.9)]) {
+                for direction in corners.into_iter().chain([middle, ray_direction(0.2, 0.9)]) {
                     let ray = Ray::new(DVec3::ZERO, direction);
                     prop_assert_eq!(scene.returns(&ray), stage.returns_of(&ray, &candidates));
                 }

@@ -268,11 +268,11 @@ impl ObjectEntry {
             }
             _ => {
                 self.refuse_others(OF_MAPS)?;
-                let at = |file: &PathBuf| placed(folder, file);
+                let path = |file: &PathBuf| placed(folder, file);
                 let files = MapFiles {
-                    depth: at(self.need("depth_file", self.depth_file.as_ref())?),
-                    reflectivity: self.reflectivity_file.as_ref().map(at),
-                    grey: self.grey_file.as_ref().map(at),
+                    depth: path(self.need("depth_file", self.depth_file.as_ref())?),
+                    reflectivity: self.reflectivity_file.as_ref().map(path),
+                    grey: self.grey_file.as_ref().map(path),
                     unit_m: self.depth_unit_m,
                     is_range: matches!(self.depth_along, Some(DepthKind::Range)),
                     focal_px: self.need("focal_px", self.focal_px)?,

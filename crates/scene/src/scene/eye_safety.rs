@@ -127,14 +127,14 @@ impl Train {
     fn around(&self, time_s: f64) -> [f64; 4] {
         let begin_s = (time_s / self.frame_s).floor() * self.frame_s;
         let last = (self.pulses - 1.0).min(((time_s - begin_s) * self.rate_hz).floor());
-        let at = |number: f64| begin_s + number / self.rate_hz;
-        let end_s = at(self.pulses - 1.0);
+        let pulse_s = |number: f64| begin_s + number / self.rate_hz;
+        let end_s = pulse_s(self.pulses - 1.0);
         let next_s = if last + 1.0 < self.pulses {
-            at(last + 1.0)
+            pulse_s(last + 1.0)
         } else {
             begin_s + self.frame_s
         };
-        [at(last), next_s, end_s, end_s + self.frame_s]
+        [pulse_s(last), next_s, end_s, end_s + self.frame_s]
     }
 }
 

@@ -62,8 +62,8 @@ impl Lidar {
         let of_wavelength = match &self.pde_curve {
             Measured::Word(_) => 1.0,
             Measured::Curve(curve) => {
-                let at = |nm| curve.interpolate(nm).unwrap_or(0.0);
-                at(self.warm_wavelength_nm()) / at(self.wavelength_nm)
+                let pde = |nm| curve.interpolate(nm).unwrap_or(0.0);
+                pde(self.warm_wavelength_nm()) / pde(self.wavelength_nm)
             }
         };
         (self.pde * self.triggering() * of_wavelength).min(1.0)

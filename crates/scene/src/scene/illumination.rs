@@ -316,7 +316,7 @@ fn with_crosstalk(falling: &[Falling], spads: &SpadModel, cols: usize) -> Vec<Fa
     let rows = falling.len() / cols;
     let avalanches = falling.par_iter().map(|own| own.avalanches(all, dead_fs));
     let avalanches: Vec<Vec<Glint>> = avalanches.collect();
-    let of = |pixel: usize| {
+    let with_neighbours = |pixel: usize| {
         let (row, col) = (pixel / cols, pixel % cols);
         let mut own = falling[pixel].clone();
         let neighbours = [
@@ -338,7 +338,10 @@ fn with_crosstalk(falling: &[Falling], spads: &SpadModel, cols: usize) -> Vec<Fa
         }
         own
     };
-    (0..falling.len()).into_par_iter().map(of).collect()
+    (0..falling.len())
+        .into_par_iter()
+        .map(with_neighbours)
+        .collect()
 }
 
 /// A macropixel's light over all segments; segments with the same light are one.

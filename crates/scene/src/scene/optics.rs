@@ -288,7 +288,7 @@ impl Scene {
         let total = total.then(|| lidar.beam_total());
         let pixels =
             (0..camera.height).flat_map(|row| (0..camera.width).map(move |col| (row, col)));
-        let of = |(row, col): (u32, u32)| {
+        let pixel_optics = |(row, col): (u32, u32)| {
             let ray = camera.at_unit_depth((f64::from(col) + 0.5, f64::from(row) + 0.5));
             let cosine = 1.0 / ray.length();
             let cube = cosine.powi(3);
@@ -302,7 +302,7 @@ impl Scene {
                 background: lens.unwrap_or(1.0),
             }
         };
-        pixels.map(of).collect()
+        pixels.map(pixel_optics).collect()
     }
 
     /// The measured laser pulse, whose times add to those of the Gaussian; `None` for a Gaussian alone.
@@ -317,12 +317,12 @@ impl Scene {
         });
         let samples = if is_even { points.len() } else { PULSE_SAMPLES };
         let step_ns = (last - first) / (samples - 1) as f64;
-        let at = |n: usize| {
+        let power = |n: usize| {
             curve
                 .interpolate((first + n as f64 * step_ns).min(last))
                 .unwrap_or(0.0)
         };
-        let powers: Vec<f64> = (0..samples).map(at).collect();
+        let powers: Vec<f64> = (0..samples).map(power).collect();
         let step = Time::from_s(step_ns * 1e-9);
         PulseShape::new(step, &powers).ok()
     }

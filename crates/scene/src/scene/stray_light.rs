@@ -184,7 +184,7 @@ pub(super) fn with_stray_light(scene: &Scene, falling: &[Falling], cols: usize) 
     // Beyond surfaces that are seen, and those that throw light on them.
     let first_surface = 2 * scene.objects.len();
     let trains: Vec<&PulseTrain> = falling.iter().flat_map(|light| &light.trains).collect();
-    let of = |to: usize| {
+    let received = |to: usize| {
         let mut own = Falling {
             background_hz: dark_hz,
             ..falling[to].clone()
@@ -227,7 +227,7 @@ pub(super) fn with_stray_light(scene: &Scene, falling: &[Falling], cols: usize) 
         }
         own
     };
-    (0..falling.len()).into_par_iter().map(of).collect()
+    (0..falling.len()).into_par_iter().map(received).collect()
 }
 
 #[cfg(test)]
@@ -270,17 +270,21 @@ mod tests {
         let middle = 16 * 33 + 16;
         let all = signals(&plain)[middle];
         let spread = signals(&halo);
-        let at = |row: i32, col: i32| spread[((16 + row) * 33 + 16 + col) as usize] / all;
+        let strength = |row: i32, col: i32| spread[((16 + row) * 33 + 16 + col) as usize] / all;
         let law = |r: f64| 0.05 / (std::f64::consts::TAU * 4.0) * (1.0 + r * r / 4.0).powf(-1.5);
         for (row, col) in [(1, 0), (0, -3), (4, 4), (-9, 2), (16, 16)] {
             let expected = law(f64::from(row * row + col * col).sqrt());
             assert!(
-                (at(row, col) / expected - 1.0).abs() < 0.02,
+                (strength(row, col) / expected - 1.0).abs() < 0.02,
                 "{row} {col}: {}",
-                at(row, col)
+                strength(row, col)
             );
         }
-        assert!((at(0, 0) - (0.95 + law(0.0))).abs() < 1e-3, "{}", at(0, 0));
+        assert!(
+            (strength(0, 0) - (0.95 + law(0.0))).abs() < 1e-3,
+            "{}",
+            strength(0, 0)
+        );
         // What misses the array: about 2 w / side of the halo.
         let total: f64 = spread.iter().sum::<f64>() / all;
         assert!((0.992..0.996).contains(&total), "{total}");

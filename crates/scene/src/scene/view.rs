@@ -300,12 +300,17 @@ fn is_deep(ranges_m: impl Iterator<Item = f64>, deep_m: f64) -> bool {
 
 /// What a macropixel sees.
 pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> Cone {
-    let at = |du: f64, dv: f64| {
+    let direction = |du: f64, dv: f64| {
         let place = (f64::from(col) + du, f64::from(row) + dv);
         camera.at_unit_depth(place).normalize()
     };
-    let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
-    Cone::about(at(0.5, 0.5), corners)
+    let corners = [
+        direction(0.0, 0.0),
+        direction(0.0, 1.0),
+        direction(1.0, 0.0),
+        direction(1.0, 1.0),
+    ];
+    Cone::about(direction(0.5, 0.5), corners)
 }
 
 /// A ray of a macropixel.

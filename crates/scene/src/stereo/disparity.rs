@@ -123,12 +123,12 @@ mod tests {
 
     /// Rims of one row, and of the same as a column.
     fn rims_of(px: &[f32], reach_px: usize, gaps_end: bool) -> String {
-        let of = |width, height| {
+        let rims = |width, height| {
             let px = px.to_vec();
             DisparityMap { width, height, px }.rims(reach_px, gaps_end)
         };
-        let row = of(px.len(), 1);
-        assert_eq!(row, of(1, px.len()));
+        let row = rims(px.len(), 1);
+        assert_eq!(row, rims(1, px.len()));
         row.iter().map(|&is| if is { '#' } else { '.' }).collect()
     }
 

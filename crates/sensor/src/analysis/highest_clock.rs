@@ -114,14 +114,14 @@ mod tests {
         let found = highest_clock(&config, &silicon, (0, 0)).unwrap();
         // The table of shortest periods has 2.457 ns for STOP on CLK's fall, to a picosecond.
         assert!((1e9 / found.clk_hz - 2.4565).abs() < 1e-3, "{found:?}");
-        let at = |clk_hz| {
+        let is_met = |clk_hz| {
             let config = SensorConfig {
                 clk_hz,
                 ..config.clone()
             };
             TimingVerdict::analyse(&config, &silicon, (0, 0)).is_met()
         };
-        assert!(at(found.clk_hz) && !at(1.0001 * found.clk_hz));
+        assert!(is_met(found.clk_hz) && !is_met(1.0001 * found.clk_hz));
         assert!(found.limit.unwrap().check.contains("strobe"));
     }
 

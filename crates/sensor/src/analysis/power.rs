@@ -169,7 +169,7 @@ impl MacropixelPower {
         let silicon = library.map(|library| {
             let characterised = library.characterised(&netlist);
             let volt = library.liberty.conditions[0].unwrap_or(capacitances.supply_v);
-            let of = |block: usize| {
+            let block_silicon = |block: usize| {
                 let (area, leakage_w) = characterised.silicon(&netlist, &library.liberty, block);
                 let changes = |net: NetId| nets[net.index()].toggles as f64 / cycles;
                 let energy =
@@ -186,7 +186,11 @@ impl MacropixelPower {
                     loads_j: energy[1],
                 }
             };
-            netlist.children(scope).chain([scope]).map(of).collect()
+            netlist
+                .children(scope)
+                .chain([scope])
+                .map(block_silicon)
+                .collect()
         });
         MacropixelPower {
             silicon: silicon.unwrap_or_default(),

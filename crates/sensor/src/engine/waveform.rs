@@ -237,13 +237,13 @@ pub fn record(
 ) -> Result<(), InputError> {
     let schedule = simulation.schedule();
     let origin = schedule.origin;
-    let at = |time: Time| match time {
+    let waveform_time = |time: Time| match time {
         Time::MAX => schedule.end,
         time => (origin + time).min(schedule.end),
     };
     let span = match *view.kept.start() {
-        from if from > Time::ZERO => at(from)..=at(*view.kept.end()),
-        _ => Time::ZERO..=at(*view.kept.end()),
+        from if from > Time::ZERO => waveform_time(from)..=waveform_time(*view.kept.end()),
+        _ => Time::ZERO..=waveform_time(*view.kept.end()),
     };
     let netlist = Arc::clone(simulation.netlist());
     let mut first_hit = FirstHit::new(&netlist, &view.pixels, origin.max(*span.start()));

@@ -200,10 +200,10 @@ mod tests {
 
     #[test]
     fn three_places_are_a_line() {
-        let at = |i: f64| (echo(0, i, 7.0), 2.0 * i + 1.0);
-        let fitted = Calibration::fit(1, &[at(1.0), at(4.0), at(6.0)]).unwrap();
+        let sample = |i: f64| (echo(0, i, 7.0), 2.0 * i + 1.0);
+        let fitted = Calibration::fit(1, &[sample(1.0), sample(4.0), sample(6.0)]).unwrap();
         assert!((fitted.depth_m(&echo(0, 10.0, 7.0)) - 21.0).abs() < 1e-12);
-        let two = Calibration::fit(1, &[at(1.0), at(4.0), at(4.0)]);
+        let two = Calibration::fit(1, &[sample(1.0), sample(4.0), sample(4.0)]);
         assert_eq!(two, Err(CalibrationError::TooFew(0)));
     }
 

@@ -114,9 +114,9 @@ type Point = (f64, f64);
 
 static TABLE: LazyLock<Vec<Point>> = LazyLock::new(|| {
     let points = (2.0 * REACH * POINTS) as usize;
-    let at = |i: usize| i as f64 / POINTS - REACH;
+    let node = |i: usize| i as f64 / POINTS - REACH;
     (0..=points + 1)
-        .map(|i| (normal_above(-at(i)), normal_density(at(i))))
+        .map(|i| (normal_above(-node(i)), normal_density(node(i))))
         .collect()
 });
 

@@ -224,15 +224,15 @@ fn won(n: f64, [echo, other]: [f64; 2], rivals: usize) -> f64 {
     // Simpson's rule over ±8 σ of the echo's bin.
     const STEPS: usize = 400;
     let step = 16.0 / STEPS as f64;
-    let at = |k: usize| {
+    let integrand = |k: usize| {
         let x = -8.0 + step * k as f64;
         let beaten = ln_normal_below((ahead + x * sigma(echo)) / sigma(other));
         normal_density(x) * libm::exp(rivals as f64 * beaten)
     };
     let inner: f64 = (1..STEPS)
-        .map(|k| if k % 2 == 1 { 4.0 } else { 2.0 } * at(k))
+        .map(|k| if k % 2 == 1 { 4.0 } else { 2.0 } * integrand(k))
         .sum();
-    (at(0) + inner + at(STEPS)) * step / 3.0
+    (integrand(0) + inner + integrand(STEPS)) * step / 3.0
 }
 
 #[cfg(test)]

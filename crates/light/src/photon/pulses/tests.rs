@@ -160,11 +160,11 @@ fn a_measured_pulse_adds_to_the_jitter() {
     // The convolution, summed over slices of the pulse.
     let slices = 2000;
     let d = kolmogorov(late.collect(), |x| {
-        let at = |i: i32| Time::from_fs(8_000_000 / i64::from(slices) * i64::from(i));
+        let slice_start = |i: i32| Time::from_fs(8_000_000 / i64::from(slices) * i64::from(i));
         (0..slices)
             .map(|i| {
-                let mass = shape.cumulative(at(i + 1)) - shape.cumulative(at(i));
-                let middle = (at(i) + at(i + 1)).as_ns() / 2.0;
+                let mass = shape.cumulative(slice_start(i + 1)) - shape.cumulative(slice_start(i));
+                let middle = (slice_start(i) + slice_start(i + 1)).as_ns() / 2.0;
                 mass * libm::erfc(-(x - middle) / 1.7 / 2f64.sqrt()) / 2.0
             })
             .sum()
@@ -200,14 +200,14 @@ fn any_part_can_be_drawn_alone() {
 
 #[test]
 fn a_longer_exposure_begins_with_the_same_photons() {
-    let of = |laser_cycles| {
+    let events = |laser_cycles| {
         let config = StreamConfig {
             laser_cycles,
             ..config()
         };
         PhotonStream::new(&config).pixel_events(5, &LIGHT).events
     };
-    let (short, long) = (of(700), of(1500));
+    let (short, long) = (events(700), events(1500));
     assert_eq!(short, long[..short.len()]);
 }
 

@@ -342,13 +342,13 @@ fn light_of_few_rays_is_close_to_that_of_very_many() {
         off.push(worst);
     }
     off.sort_by(f64::total_cmp);
-    let at = |share: f64| off[(share * (off.len() - 1) as f64) as usize];
+    let quantile = |share: f64| off[(share * (off.len() - 1) as f64) as usize];
     println!(
         "median {:.4}, 90 % {:.4}, worst {:.4} of a macropixel's photons, {worst_photons:.4} of the brightest; {plain} of {} have one echo",
-        at(0.5),
-        at(0.9),
-        at(1.0),
+        quantile(0.5),
+        quantile(0.9),
+        quantile(1.0),
         off.len()
     );
-    assert!(at(0.5) < 0.002 && at(0.9) < 0.02 && worst_photons < 0.01);
+    assert!(quantile(0.5) < 0.002 && quantile(0.9) < 0.02 && worst_photons < 0.01);
 }

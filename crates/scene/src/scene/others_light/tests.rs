@@ -28,13 +28,13 @@ fn before_a_wall(reflectivity: f64, keys: &str) -> Scene {
 fn others(scene: &Scene, across: u32) -> Vec<Vec<PulseTrain>> {
     let truth = GroundTruth::render(scene, across, across);
     let budget = scene.photon_budget(across, across);
-    let of = |view: &std::sync::Arc<crate::scene::view::View>| {
+    let trains = |view: &std::sync::Arc<crate::scene::view::View>| {
         let others = view.others.iter();
         others
             .filter_map(|s| s.train(scene, &budget, 1.0))
             .collect()
     };
-    truth.views.iter().map(of).collect()
+    truth.views.iter().map(trains).collect()
 }
 
 #[test]

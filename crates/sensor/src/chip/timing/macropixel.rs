@@ -310,12 +310,16 @@ impl<'c> MacropixelPaths<'c> {
     fn joining(&self) -> Option<Span> {
         let probes = &self.circuit.probes;
         let photons = probes.find(Probe::Photons)?[0];
-        let of = |&toggle: &NetId| {
+        let arrival_window = |&toggle: &NetId| {
             let starts = Edge::BOTH.map(|edge| (toggle, edge));
             let arrivals = self.analysis.arrivals(&starts, probes.latched());
             arrivals.expect("every loop is cut").window(photons)
         };
-        probes.toggles().iter().filter_map(of).reduce(hull)
+        probes
+            .toggles()
+            .iter()
+            .filter_map(arrival_window)
+            .reduce(hull)
     }
 
     fn after(&self, from: Probe, edges: &[Edge], cuts: &[Probe]) -> Arrivals<'c> {

@@ -281,13 +281,13 @@ impl Cohort {
         start: u16,
         light: &PixelLight,
     ) -> Result<f64, EngineError> {
-        let of = |like: LikeCycles| match self.way(&like) {
+        let steps = |like: LikeCycles| match self.way(&like) {
             Way::Pooled => like.means.len() as f64,
             Way::Recent(histories) => of_histories(histories.number()),
             Way::Joint => of_joint_states(&like, self.is_event.spads()),
         };
         let cohorts = self.cohorts(stream, start, light)?.unwrap_or_default();
-        Ok(cohorts.into_iter().map(of).sum())
+        Ok(cohorts.into_iter().map(steps).sum())
     }
 
     /// Mean of every bin of [`Cohort::hits`], computed.

@@ -427,13 +427,14 @@ mod tests {
             let ages = Ages::steady(&blindness, 0.1);
             let means = light();
             let no_event = is_event.no_event().unwrap();
-            let of = |rows| {
+            let weighted = |rows| {
                 let spads = (no_event.weight, is_event.spads());
                 Weighted::new(&blindness, &ages, spads, rows)
             };
-            let pairs = Pairs::new(of(1), &no_event, &means);
-            let [few, some, all] = KNOWN
-                .map(|known| Histories::new(of((1 << known) / LANES), &no_event, known, &means));
+            let pairs = Pairs::new(weighted(1), &no_event, &means);
+            let [few, some, all] = KNOWN.map(|known| {
+                Histories::new(weighted((1 << known) / LANES), &no_event, known, &means)
+            });
             assert_eq!(pairs.left_out_by(&all.0, &all.1, 1.0), 0.0);
             let exact = correlations(&all.0);
             for (histories, without) in [&few, &some] {

@@ -176,12 +176,12 @@ impl SpadLight {
 
     /// Most background photons that `duration_fs` have on average.
     pub(super) fn most_background(&self, duration_fs: f64) -> f64 {
-        let of = |segment: &SpadSegment| {
+        let background = |segment: &SpadSegment| {
             let profile = segment.profile.as_ref();
             let greatest_hz = profile.map_or(0.0, |profile| profile.greatest_hz);
             segment.background_per_fs + greatest_hz * 1e-15 / self.spads
         };
-        self.segments.iter().map(of).fold(0.0, f64::max) * duration_fs
+        self.segments.iter().map(background).fold(0.0, f64::max) * duration_fs
     }
 
     /// An upper bound on the mean photons in a stretch that begins at `from_fs` of any laser cycle: what all laser

@@ -168,7 +168,7 @@ impl Levelised {
             .filter(|&net| net != survey.clk)
             .collect();
         let groups = survey.uniform_edges(config, exposure, &others);
-        let at = |time: Time| {
+        let clk_fall = |time: Time| {
             let k = (exposure
                 .clock
                 .half_periods_until(time + exposure.stop_phase))
@@ -179,7 +179,7 @@ impl Levelised {
         let mut causes: Vec<Vec<(i64, Cause)>> = Vec::new();
         for group in &groups {
             let of_group = group.iter().map(|edge| {
-                let (pass, position_fs) = at(edge.time);
+                let (pass, position_fs) = clk_fall(edge.time);
                 (
                     pass,
                     Cause {

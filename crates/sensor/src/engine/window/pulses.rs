@@ -104,11 +104,11 @@ impl Window {
         event_of: impl Fn(&P) -> SpadEvent,
     ) {
         let stage = self.law.timing().photon_line_stage;
-        let of = |pulse: &P| {
+        let time_and_spad = |pulse: &P| {
             let event = event_of(pulse);
             (event.time, event.spad)
         };
-        photon_line::model(pulses, of, self.sensor.spads(), stage);
+        photon_line::model(pulses, time_and_spad, self.sensor.spads(), stage);
     }
 
     /// The same by the edges of the bins, whatever those are: laser cycle by laser cycle, leaving out those without pulses.

@@ -43,9 +43,16 @@ fn ball(rings: usize, radius: f64) -> String {
             corners.push([radius * x * down, radius * cross, radius * z * down]);
         }
     }
-    let at = move |ring: usize, column: usize| ring * columns + column % columns;
+    let corner = move |ring: usize, column: usize| ring * columns + column % columns;
     let faces = (0..rings).flat_map(move |r| {
-        (0..columns).map(move |c| vec![at(r, c), at(r, c + 1), at(r + 1, c + 1), at(r + 1, c)])
+        (0..columns).map(move |c| {
+            vec![
+                corner(r, c),
+                corner(r, c + 1),
+                corner(r + 1, c + 1),
+                corner(r + 1, c),
+            ]
+        })
     });
     obj_of(&corners, faces)
 }
