@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use guided_dtof::guide::{GuideError, GuideInput, GuideMap, PastFrame, options};
-use guided_dtof::photon::{Purpose, normal, random_stream};
+use guided_dtof::photon::{RandomPurpose, normal, random_stream};
 use guided_dtof::scene::{GroundTruth, Scene};
 
 /// Guides of the table, fused where there are several.
@@ -115,7 +115,7 @@ fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<Kept, GuideError> {
 fn past(scene: &Scene, time_s: f64, seed: u64, number: usize) -> PastFrame {
     let truth = GroundTruth::render(&scene.snapshot(time_s), SIZE, SIZE);
     let ranges = (0u32..).zip(&truth.range_m).map(|(pixel, range_m)| {
-        let mut random = random_stream(seed, Purpose::Guide, pixel, DRAWS + number as u32);
+        let mut random = random_stream(seed, RandomPurpose::Guide, pixel, DRAWS + number as u32);
         range_m.map(|range_m| range_m + DEPTH_SIGMA_M * normal(&mut random))
     });
     PastFrame {

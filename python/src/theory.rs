@@ -2,9 +2,9 @@
 
 use guided_dtof::theory::cycles::laser_cycles_for;
 use guided_dtof::theory::design::{Design, StereoPair};
-use guided_dtof::theory::detection::{self, Model, PerCycle, Ties};
+use guided_dtof::theory::detection::{self, DetectionModel, PerCycle, Ties};
 use guided_dtof::theory::front_ends;
-use guided_dtof::theory::partial::{Goal, Link, Models, System};
+use guided_dtof::theory::partial::{Link, Models, RangingGoal, System};
 use guided_dtof::theory::precision;
 use guided_dtof::theory::significance::Scan;
 use guided_dtof::units::SPEED_OF_LIGHT_M_PER_S;
@@ -21,16 +21,16 @@ const CHUNK: usize = 16;
 /// A formula, given a row of its arguments.
 type Formula = Box<dyn Fn(&[f64]) -> f64 + Send + Sync>;
 
-fn model(name: &str) -> Result<Model, Failure> {
+fn model(name: &str) -> Result<DetectionModel, Failure> {
     Ok(match name {
-        "poisson" => Model::Poisson(Ties::Random),
-        "poisson_strict" => Model::Poisson(Ties::Strict),
-        "poisson_loose" => Model::Poisson(Ties::Loose),
-        "bernoulli" => Model::Bernoulli(Ties::Random),
-        "bernoulli_strict" => Model::Bernoulli(Ties::Strict),
-        "bernoulli_loose" => Model::Bernoulli(Ties::Loose),
-        "gaussian" => Model::Gaussian,
-        "gaussian_as_printed" => Model::GaussianAsPrinted,
+        "poisson" => DetectionModel::Poisson(Ties::Random),
+        "poisson_strict" => DetectionModel::Poisson(Ties::Strict),
+        "poisson_loose" => DetectionModel::Poisson(Ties::Loose),
+        "bernoulli" => DetectionModel::Bernoulli(Ties::Random),
+        "bernoulli_strict" => DetectionModel::Bernoulli(Ties::Strict),
+        "bernoulli_loose" => DetectionModel::Bernoulli(Ties::Loose),
+        "gaussian" => DetectionModel::Gaussian,
+        "gaussian_as_printed" => DetectionModel::GaussianAsPrinted,
         _ => {
             let message = format!(
                 "{name:?} is no model; give poisson, bernoulli (with _strict or _loose for ties), gaussian or gaussian_as_printed"
@@ -48,7 +48,11 @@ fn light(row: &[f64]) -> PerCycle {
     }
 }
 
-fn system(row: &[f64], detection: Model, precision: fn(f64, f64, f64, f64) -> f64) -> System {
+fn system(
+    row: &[f64],
+    detection: DetectionModel,
+    precision: fn(f64, f64, f64, f64) -> f64,
+) -> System {
     let &[
         _,
         signal,
@@ -68,7 +72,7 @@ fn system(row: &[f64], detection: Model, precision: fn(f64, f64, f64, f64) -> f6
         background_hz,
         pulse_sigma_s,
     };
-    let goal = Goal {
+    let goal = RangingGoal {
         precision_m,
         detection: probability,
     };

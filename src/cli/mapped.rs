@@ -9,7 +9,8 @@ use super::voice::{note, notes, say_unless_quiet};
 use crate::chip::{CellLibrary, FromFile, Probes, SensorConfig, macropixel};
 use crate::files::{InputError, OutputFile, ResultSet};
 use crate::liberty::{
-    Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
+    CharacterisedNetlist, Clocking, write_constraints, write_mapped, write_mapped_cells,
+    write_mapped_sdf,
 };
 use crate::netlist::Netlist;
 
@@ -28,7 +29,7 @@ struct Mapped<'c> {
     config: &'c SensorConfig,
     cells: &'static FromFile,
     netlist: Netlist,
-    characterised: Characterised,
+    characterised: CharacterisedNetlist,
 }
 
 impl<'c> Mapped<'c> {

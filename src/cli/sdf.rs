@@ -13,8 +13,8 @@ use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::{Corner, Netlist, Timing};
 use crate::sdf::{
-    Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities,
-    write_library_sdf, write_sdf,
+    Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, SkippedEntry, annotate,
+    oddities, write_library_sdf, write_sdf,
 };
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -156,7 +156,7 @@ pub(super) fn annotated_timing(
     for oddity in oddities(&sdf, config.corner) {
         note(format_args!("{}:{}: {oddity}", sdf.source, oddity.line()));
     }
-    let skipped_line = |skipped: &Skipped| {
+    let skipped_line = |skipped: &SkippedEntry| {
         format!(
             "{}:{}: left out or approximated {} of: {}",
             sdf.source, skipped.first_line, skipped.count, skipped.what
@@ -192,7 +192,7 @@ pub(super) fn annotated_timing(
 
 /// Why nothing of a file was taken over, and what to do.
 fn why_unused(sdf: &Sdf<'_>, corner: Corner, result: &Annotation) -> String {
-    let left_out = |skipped: &[Skipped]| {
+    let left_out = |skipped: &[SkippedEntry]| {
         let names: Vec<&str> = skipped.iter().map(|skipped| skipped.what).collect();
         names.join(", ")
     };

@@ -7,7 +7,7 @@ use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{Cohort, CohortOptions, EngineError, Expose, Gate, LitPixel, Window, expose};
 use crate::files::InputError;
 use crate::numerics::intervals::{Estimate, deviation, share};
-use crate::photon::{PhotonStream, PixelLight, Purpose, normal, random_stream};
+use crate::photon::{PhotonStream, PixelLight, RandomPurpose, normal, random_stream};
 use crate::ranging::DepthOptions;
 use crate::request::{Spelling, guided_exposure};
 use crate::scene::Scene;
@@ -81,7 +81,7 @@ impl Bench {
     /// target's range, m, with the macropixel.
     fn pixel(&self, problem: &Problem, point: &Point, number: u32, seed: u64) -> (f64, LitPixel) {
         let design = &point.design;
-        let mut random = random_stream(seed, Purpose::Guide, number, 0);
+        let mut random = random_stream(seed, RandomPurpose::Guide, number, 0);
         let bin_m = 0.5 * SPEED_OF_LIGHT_M_PER_S / design.clk_hz;
         let phase = (f64::from(number) * 0.618_033_988_749_895).fract() - 0.5;
         let range_m = problem.goal().range_m + phase * bin_m;

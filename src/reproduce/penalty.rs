@@ -9,7 +9,7 @@ use super::parameters::{
     long_range, sigma_over_fwhm,
 };
 use super::thesis::{ClaimText, claim};
-use crate::theory::detection::{Model, Ties};
+use crate::theory::detection::{DetectionModel, Ties};
 use crate::theory::partial::{Cost, Models, System};
 use crate::theory::precision;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -17,7 +17,7 @@ use crate::units::SPEED_OF_LIGHT_M_PER_S;
 pub(super) mod charts;
 
 /// As this chip counts: one hit per bin and cycle.
-const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
+const ONE_HIT: DetectionModel = DetectionModel::Bernoulli(Ties::Random);
 
 /// The same system, counting as this chip does in its detection steps.
 fn one_hit(system: System) -> System {

@@ -8,7 +8,7 @@ use super::thesis::{chart, claim};
 use crate::chip::hslidar_delay_line;
 use crate::photon::Atmosphere;
 use crate::report::Chart;
-use crate::theory::detection::{self, Model, PerCycle, Ties};
+use crate::theory::detection::{self, DetectionModel, PerCycle, Ties};
 use crate::theory::precision::cramer_rao;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -87,7 +87,7 @@ fn detection_at(range_m: f64, klux: f64, factor: f64) -> f64 {
         bins: system.bins,
     };
     let cycles = (LASER_HZ * EXPOSURE_S) as u64;
-    detection::probability(&light, cycles, Model::Bernoulli(Ties::Random)).probability
+    detection::probability(&light, cycles, DetectionModel::Bernoulli(Ties::Random)).probability
 }
 
 /// Least visibility in which a target of 10 % at `range_m` is found with 99.7 %, m.

@@ -12,7 +12,7 @@
 
 use rand_philox::{philox4x32_10, u32_to_unit_f64};
 
-use crate::photon::{Purpose, philox_key};
+use crate::photon::{RandomPurpose, philox_key};
 
 /// How points are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +52,7 @@ const WITHIN: u32 = 100;
 const SHIFT: u32 = 101;
 
 fn words(key: [u32; 2], axis: u32, what: u32, index: u64) -> [u32; 4] {
-    let purpose = (Purpose::Sweep as u32) << 16 | axis;
+    let purpose = (RandomPurpose::Sweep as u32) << 16 | axis;
     philox4x32_10([index as u32, (index >> 32) as u32, what, purpose], key)
 }
 

@@ -12,7 +12,7 @@ use crate::settings::Range::{Above, Within};
 use crate::settings::{keys, words};
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::design::share_inside;
-use crate::theory::detection::{Detection, Model, PerCycle, probability};
+use crate::theory::detection::{Detection, DetectionModel, PerCycle, probability};
 use crate::theory::precision::{cramer_rao, range_m, thompson};
 use crate::theory::spread_echo::{Hits, SpreadEcho};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -242,8 +242,8 @@ impl Wall {
         let (found, needed) = match self.model {
             Counts::Bernoulli => spread(Hits::OneACycle),
             Counts::Poisson => spread(Hits::All),
-            Counts::Gaussian => in_one_bin(Model::Gaussian),
-            Counts::GaussianAsPrinted => in_one_bin(Model::GaussianAsPrinted),
+            Counts::Gaussian => in_one_bin(DetectionModel::Gaussian),
+            Counts::GaussianAsPrinted => in_one_bin(DetectionModel::GaussianAsPrinted),
         };
         let cycles = |cycles: Option<u64>| cycles.map_or(f64::INFINITY, |cycles| cycles as f64);
         (found, needed.map(cycles))
@@ -256,7 +256,7 @@ mod tests {
     use rand_philox::Philox;
 
     use crate::chip::{hslidar, hslidar_delay_line};
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
     use crate::settings::Settings;
 
     #[test]
@@ -442,7 +442,7 @@ mod tests {
         let widths_ns = [1.0 * TO_SIGMA, 3.0 * TO_SIGMA, 1.5];
         let fwhm_ns = widths_ns.map(|ns| ns * ns).iter().sum::<f64>().sqrt() / TO_SIGMA;
         let within = (0.5 * fwhm_ns / bin_ns).max(1.0);
-        let mut random = random_stream(5, Purpose::Photons, 0, 0);
+        let mut random = random_stream(5, RandomPurpose::Photons, 0, 0);
         let mut right = 0;
         let trials = 3000;
         for _ in 0..trials {

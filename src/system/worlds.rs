@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::chip::Exposure;
 use crate::photon::{PhotonStream, PixelLight};
-use crate::scene::{Before, GroundTruth, Scene};
+use crate::scene::{GroundTruth, PreviousWorld, Scene};
 
 /// The last world of an exposure.
 #[derive(Debug)]
@@ -47,7 +47,7 @@ pub(super) fn truths(
     let mut all_kept = 0;
     for (n, world) in worlds.iter().enumerate() {
         let before = match truths.last() {
-            Some(truth) => Some(Before {
+            Some(truth) => Some(PreviousWorld {
                 world: &worlds[n - 1],
                 truth,
             }),
@@ -74,7 +74,7 @@ pub(super) fn lights(
         let before = match lights.last() {
             Some(light) => {
                 let (world, truth) = (&worlds[n - 1], &truths[n - 1]);
-                Some((Before { world, truth }, &light[..]))
+                Some((PreviousWorld { world, truth }, &light[..]))
             }
             None => last.map(|last| (last.seen(), &last.light[..])),
         };
@@ -98,8 +98,8 @@ impl LastWorld {
         })
     }
 
-    fn seen(&self) -> Before<'_> {
-        Before {
+    fn seen(&self) -> PreviousWorld<'_> {
+        PreviousWorld {
             world: &self.world,
             truth: &self.truth,
         }

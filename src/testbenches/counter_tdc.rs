@@ -23,7 +23,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Start value.
 const START: u16 = 3;
@@ -235,12 +235,12 @@ fn view(config: &SensorConfig, shown: (Time, Time), origin: Time) -> Layout {
     let period = config.clock().period();
     Layout {
         groups: vec![
-            Group::new(
+            SignalGroup::new(
                 "Global signals",
                 [Entry::binary("CLK"), Entry::binary("STOP")],
             ),
-            Group::new(format!("Window of start value {START}"), window),
-            Group::new("Events", events.into_iter().chain(bins)),
+            SignalGroup::new(format!("Window of start value {START}"), window),
+            SignalGroup::new("Events", events.into_iter().chain(bins)),
         ],
         zoom: (shown.0 - period * 2, shown.1 + period * 3),
         marker: Some(origin),

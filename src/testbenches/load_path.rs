@@ -19,7 +19,7 @@ use crate::netlist::{CellKind, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 use bitvec::slice::BitSlice;
 
 /// When the chip comes out of reset.
@@ -381,14 +381,14 @@ fn view(config: &SensorConfig, (start, end): (Time, Time)) -> Layout {
         Entry::hex(LoadProbe::Row.path()),
         Entry::binary(LoadProbe::RowDone.path()),
     ];
-    let mut groups = vec![Group::new("Load path (Fig. 57)", shared)];
+    let mut groups = vec![SignalGroup::new("Load path (Fig. 57)", shared)];
     for row in 0..config.rows {
         let load = Probe::MemoryLoad.path(&load_path::memory_name(row, 0));
         let memories = (0..config.cols).map(|col| {
             let memory = Entry::decimal(probes::memory_path(row, col));
             memory.named(format!("MEMORY of column {col}"))
         });
-        groups.push(Group::new(
+        groups.push(SignalGroup::new(
             format!("Row {row}, columns 0 to {}", config.cols - 1),
             [Entry::binary(load)].into_iter().chain(memories),
         ));

@@ -27,7 +27,7 @@ use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::testbenches::testbench::GivenSensor;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout, Mark};
+use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
 /// Start values of Fig. 48's two macropixels, three bins apart.
 const FIG_48: [u16; 2] = [52, 49];
@@ -328,7 +328,7 @@ fn view(
         &["CLK", "STOP", "ENABLE"]
     };
     let pins = pins.iter().copied().map(Entry::binary);
-    let mut groups = vec![Group::new("Global signals", pins)];
+    let mut groups = vec![SignalGroup::new("Global signals", pins)];
     let is_there = |entry: &Entry| netlist.signal(&entry.path).is_some();
     for (col, start) in starts.into_iter().enumerate() {
         let pixel = array::pixel_name(0, col);
@@ -352,7 +352,7 @@ fn view(
         };
         let bins = bins.into_iter();
         let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
-        groups.push(Group::new(
+        groups.push(SignalGroup::new(
             format!("Macropixel {}: start value {start} ({figure})", col + 1),
             signals.into_iter().filter(is_there).chain(bins),
         ));

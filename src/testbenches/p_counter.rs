@@ -26,7 +26,7 @@ use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::testbenches::testbench::GivenSensor;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Start values of Fig. 54, and of what is loaded afterwards, where they fit.
 const FIG_54: [u64; 2] = [5, 9];
@@ -460,8 +460,8 @@ fn view(netlist: &Netlist, first_stop: Time, last: Time) -> Layout {
     let is_there = |entry: &Entry| netlist.signal(&entry.path).is_some();
     Layout {
         groups: vec![
-            Group::new("Global signals", inputs),
-            Group::new("P-counter (Fig. 54)", counter.into_iter().filter(is_there)),
+            SignalGroup::new("Global signals", inputs),
+            SignalGroup::new("P-counter (Fig. 54)", counter.into_iter().filter(is_there)),
         ],
         zoom: (Time::ZERO, last),
         marker: Some(first_stop),

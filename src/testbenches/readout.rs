@@ -25,7 +25,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Shown before the readout begins.
 const PAUSE: Time = Time::from_ns(50);
@@ -245,14 +245,14 @@ fn view(config: &SensorConfig, counted: Time) -> Layout {
         Entry::binary(LoadProbe::MemoryLoad.path()),
     ];
     let mut groups = vec![
-        Group::new("Readout (4.2)", readout),
-        Group::new("Load meanwhile (4.7)", load),
+        SignalGroup::new("Readout (4.2)", readout),
+        SignalGroup::new("Load meanwhile (4.7)", load),
     ];
     for col in 0..config.cols {
         let pixel = array::pixel_name(0, col);
         let bins = (0..3).map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
         let memory = [Entry::decimal(Probe::Memory.path(&pixel))];
-        groups.push(Group::new(
+        groups.push(SignalGroup::new(
             format!("Macropixel {pixel}"),
             bins.chain(memory),
         ));

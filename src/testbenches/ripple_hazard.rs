@@ -33,7 +33,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Start value of both macropixels.
 const START: u16 = 20;
@@ -361,7 +361,7 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
     let cycle = bins().iter().position(|&bin| bin == doubled).unwrap_or(0) as i64;
     // The falling edge that is counted last, and the half period that the strobe takes.
     let strobe = stop(cycle) + period * (START as i64 + 1) + Time::from_fs(period.as_fs() / 2);
-    let mut groups = vec![Group::new(
+    let mut groups = vec![SignalGroup::new(
         "Global signals",
         ["CLK", "STOP"].map(Entry::binary),
     )];
@@ -382,7 +382,7 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
             .iter()
             .map(|&bin| Entry::decimal(probes::bin_path(&pixel, bin)));
         let title = format!("{pixel}: {title} (Fig. 56)");
-        groups.push(Group::new(title, signals.into_iter().chain(bins)));
+        groups.push(SignalGroup::new(title, signals.into_iter().chain(bins)));
     }
     Layout {
         groups,

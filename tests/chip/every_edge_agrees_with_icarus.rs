@@ -12,7 +12,7 @@ use guided_dtof::chip::{
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::{Corner, Netlist};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
-use guided_dtof::waves::{Selection, VcdWriter};
+use guided_dtof::waves::{VcdWriter, WaveSelection};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 use crate::every_edge::waves::{Figures, Waves};
@@ -53,7 +53,7 @@ fn compare_silicon(scenario: &Scenario, silicon: &Silicon) -> Figures {
     let theirs = Waves::read(BufReader::new(dump), "tb.dut");
 
     let mut gate = GateSimulation::new(&sensor, exposure, (0, 0), size, starts, &pulses);
-    let selection = Selection::all().with_anonymous();
+    let selection = WaveSelection::all().with_anonymous();
     let mut writer = VcdWriter::new(Vec::new(), gate.netlist(), &selection).unwrap();
     gate.run(&mut writer);
     let end = gate.schedule().end;

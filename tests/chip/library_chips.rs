@@ -11,7 +11,8 @@ use guided_dtof::chip::{
     hslidar_delay_line, macropixel,
 };
 use guided_dtof::liberty::{
-    Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
+    CharacterisedNetlist, Clocking, write_constraints, write_mapped, write_mapped_cells,
+    write_mapped_sdf,
 };
 use guided_dtof::netlist::Netlist;
 use guided_dtof::units::Time;
@@ -77,7 +78,7 @@ pub struct Mapped {
     pub config: SensorConfig,
     pub cells: &'static FromFile,
     pub netlist: Netlist,
-    pub characterised: Characterised,
+    pub characterised: CharacterisedNetlist,
 }
 
 impl Mapped {

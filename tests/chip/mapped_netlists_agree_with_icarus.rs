@@ -1,7 +1,7 @@
 //! `mapped.v` with `mapped_cells.v` and `mapped.sdf`, in Icarus Verilog, beside our kernel with the library's delays: every edge of every net of a macropixel.
 //!
 //! ```text
-//!   gate engine ─► what comes to the macropixel's pins ─┬─► Kernel, delays of `Characterised` ─┐
+//!   gate engine ─► what comes to the macropixel's pins ─┬─► Kernel, delays of `CharacterisedNetlist` ─┐
 //!                                                       └─► Icarus, mapped.v and mapped.sdf ───┴─► the same?
 //! ```
 //!

@@ -20,7 +20,7 @@ use guided_dtof::logic::Logic;
 use guided_dtof::netlist::NetId;
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Selection, VcdWriter};
+use guided_dtof::waves::{VcdWriter, WaveSelection};
 use icarus::Seen;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -311,7 +311,7 @@ fn icarus_reads_the_same_through_the_exported_pins() {
         assert_eq!(pins, counters, "{config:?}");
 
         gate = gate.with_readout();
-        let all = Selection::all().with_anonymous();
+        let all = WaveSelection::all().with_anonymous();
         let mut writer = VcdWriter::new(Vec::new(), gate.netlist(), &all).unwrap();
         gate.run(&mut writer);
         let end = gate.schedule().end;

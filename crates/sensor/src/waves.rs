@@ -62,7 +62,7 @@ impl WaveFile {
         path: &Path,
         format: WaveFormat,
         netlist: &Netlist,
-        selection: &Selection,
+        selection: &WaveSelection,
         span: RangeInclusive<Time>,
     ) -> Result<Self, InputError> {
         let failed = |e| InputError::unwritable(path, &e);

@@ -11,7 +11,7 @@ use super::crosstalk;
 use super::detector::{described_detector, description, within};
 use super::returns::{shown, write_further, write_further_head};
 use crate::cli::voice::{note, say_json, say_unless_quiet};
-use crate::files::{HistogramFormat, Histograms, InputError, OutputFile, ZoneCounts};
+use crate::files::{HistogramFormat, InputError, OutputFile, ZoneCounts, ZoneHistograms};
 use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
@@ -52,7 +52,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
     }
     let kept = args.bins.as_deref().map(bins).transpose()?;
     let described = description(args)?;
-    let mut histograms = Histograms::read(&args.histograms, format, args.counts_per_unit)?;
+    let mut histograms = ZoneHistograms::read(&args.histograms, format, args.counts_per_unit)?;
     let whole = described_detector(args, &described, histograms.bins)?;
     let kept = kept.unwrap_or(0..histograms.bins);
     if kept.end > histograms.bins {
@@ -117,7 +117,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
 }
 
 /// Zones whose histogram is that of the zone before them.
-fn repeated(histograms: &Histograms) -> usize {
+fn repeated(histograms: &ZoneHistograms) -> usize {
     let of_capture = |capture: &ZoneCounts| {
         let zones: Vec<&[u32]> = capture.counts.chunks_exact(histograms.bins).collect();
         let is_repeated = |pair: &&[&[u32]]| {

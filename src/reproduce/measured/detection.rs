@@ -9,12 +9,12 @@ use crate::report::{Chart, Grid};
 use crate::reproduce::parameters::sigma_over_fwhm;
 use crate::reproduce::thesis::measurement;
 use crate::theory::cycles::laser_cycles_for;
-use crate::theory::detection::{Model, PerCycle, Ties, probability};
+use crate::theory::detection::{DetectionModel, PerCycle, Ties, probability};
 
 /// Eq. 17 with every photon counted, ties by lot.
-const EQ_17: Model = Model::Poisson(Ties::Random);
+const EQ_17: DetectionModel = DetectionModel::Poisson(Ties::Random);
 /// The same with one hit per bin and cycle.
-const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
+const ONE_HIT: DetectionModel = DetectionModel::Bernoulli(Ties::Random);
 
 /// Background of the thesis's Table 6, counts/s.
 const DAYLIGHT_HZ: f64 = 20e6;
@@ -45,7 +45,7 @@ pub(super) fn judged(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Es
     share(histograms.iter().map(won).sum(), histograms.len() as f64)
 }
 
-fn by_formula(light: &PerCycle, cycles: u32, model: Model) -> f64 {
+fn by_formula(light: &PerCycle, cycles: u32, model: DetectionModel) -> f64 {
     probability(light, cycles.into(), model).probability
 }
 

@@ -11,7 +11,7 @@ use crate::report::{Chart, Grid};
 use crate::reproduce::parameters::sigma_over_fwhm;
 use crate::reproduce::thesis::measurement;
 use crate::theory::Pulse;
-use crate::theory::estimators::Expected;
+use crate::theory::estimators::ExpectedHistogram;
 use crate::theory::precision::{cramer_rao, thompson};
 
 /// How a histogram becomes a time.
@@ -64,7 +64,7 @@ pub(super) fn errors_ns(
     let shift = |frame: usize| (frame as f64 + 0.5) / frames as f64 - 0.5;
     let histograms = trial.histograms(frames, seed, shift)?;
     let (background, signal) = levels(trial, &histograms);
-    let expected = Expected {
+    let expected = ExpectedHistogram {
         pulse: Pulse::Gaussian {
             sigma_ns: trial.sigma_ns,
         },

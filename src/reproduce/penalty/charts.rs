@@ -8,7 +8,7 @@ use crate::reproduce::measured::partial::{
 use crate::reproduce::parameters::{demonstrator, long_range};
 use crate::reproduce::thesis::{chart, grid};
 use crate::theory::capacity::full_bins;
-use crate::theory::partial::{Purpose, System};
+use crate::theory::partial::{StepPurpose, System};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Laser cycles of a system's schemes against range. What zooming detects and which windows sliding visits changes
@@ -31,7 +31,9 @@ impl Curves {
         let window_end_m = |window: u32| f64::from(window) * system.window_m;
         let detecting = (1..=windows).map(|window| {
             let steps = system.zooming(window_end_m(window)).steps;
-            let detections = steps.iter().filter(|step| step.purpose != Purpose::Measure);
+            let detections = steps
+                .iter()
+                .filter(|step| step.purpose != StepPurpose::Measure);
             detections.map(|step| step.laser_cycles).sum()
         });
         let mut sum = 0.0;

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use super::*;
 use crate::chip::{SensorConfig, hslidar};
 use crate::guide::{Guide, GuideInput, NoisyTruth};
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::{DVec3, Object, Scene, Shape};
 use crate::system::{FrameSettings, PixelDepth, take_guided_frame};
 
@@ -102,7 +102,7 @@ fn a_macropixel_in_doubt_steps_until_it_has_found_its_target() {
     };
     let truth_m: Vec<Option<f64>> = (0..SIZE * SIZE)
         .map(|pixel| {
-            let mut random = random_stream(3, Purpose::Guide, pixel as u32, 0);
+            let mut random = random_stream(3, RandomPurpose::Guide, pixel as u32, 0);
             Some(guide_m + sigma_m * normal(&mut random))
         })
         .collect();

@@ -6,7 +6,7 @@ use crate::logic::Logic;
 use crate::netlist::{Corner, Library, ModuleBuilder, NetId, Netlist, Timing};
 use crate::theory::front_ends::non_paralysable_hz;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 use rand_philox::{philox4x32_10, u32_to_unit_f64};
 
 /// SPADs of a macropixel.
@@ -225,11 +225,11 @@ pub(super) fn view() -> Layout {
     };
     let timed = |kind: FrontEnd| Entry::hex(format!("{}_TIMED", kind.name().to_uppercase()));
     let group = |title: &str, kind, names| {
-        Group::new(title, inside(kind, names).into_iter().chain([timed(kind)]))
+        SignalGroup::new(title, inside(kind, names).into_iter().chain([timed(kind)]))
     };
     Layout {
         groups: vec![
-            Group::new(
+            SignalGroup::new(
                 "SPADs and clock",
                 [Entry::hex("SPAD_RAW"), Entry::binary("CLK")],
             ),

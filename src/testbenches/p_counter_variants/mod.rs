@@ -34,7 +34,7 @@ use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout, Mark};
+use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
 /// The first scene: a start value with its most significant bit high.
 const HIGH: Scene = Scene {
@@ -245,7 +245,7 @@ impl Bench {
 
     fn view(&self) -> Layout {
         let shared = ["CLK", "STOP", "ENABLE", "SPAD_EVENT", "HIT_CLEAR"].map(Entry::binary);
-        let mut groups = vec![Group::new("Global signals", shared)];
+        let mut groups = vec![SignalGroup::new("Global signals", shared)];
         for (name, tap, _) in CHANNELS {
             let [hit, early_hit] =
                 METDCS.map(|metdc| Entry::hex(Probe::Hit.path(&format!("{name}.{metdc}"))));
@@ -256,10 +256,10 @@ impl Bench {
                 Entry::binary(Probe::LocalStop.path(name)),
                 hit,
             ];
-            groups.push(Group::new(format!("P-counter {name}"), signals));
+            groups.push(SignalGroup::new(format!("P-counter {name}"), signals));
             if tap == Tap::Msb {
                 let name = format!("P-counter {name}, HIT cleared before STOP");
-                groups.push(Group::new(name, [early_hit]));
+                groups.push(SignalGroup::new(name, [early_hit]));
             }
         }
         Layout {

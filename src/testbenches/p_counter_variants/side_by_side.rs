@@ -11,7 +11,7 @@ use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
 use crate::netlist::{ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 use super::circuit::{ORIGIN, RESET_END, finished, place_counter};
 use super::text::{listed, numbers};
@@ -153,7 +153,7 @@ fn drives(netlist: &Netlist, exposure: &Exposure) -> Vec<Drive> {
 
 fn view(netlist: &Netlist, end: Time) -> Layout {
     let shared = ["CLK", "STOP", "ENABLE"].map(Entry::binary);
-    let mut groups = vec![Group::new("Global signals", shared)];
+    let mut groups = vec![SignalGroup::new("Global signals", shared)];
     for p_counter in PCounter::ALL {
         let probes = Probes::below_instance(netlist, p_counter.name());
         let own = p_counter.row().nets.iter();
@@ -173,7 +173,7 @@ fn view(netlist: &Netlist, end: Time) -> Layout {
             _ => Entry::binary(probes.path(probe)),
         });
         let name = format!("P-counter {}", p_counter.name());
-        groups.push(Group::new(name, shown.chain(own)));
+        groups.push(SignalGroup::new(name, shown.chain(own)));
     }
     Layout {
         groups,

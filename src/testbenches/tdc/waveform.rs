@@ -12,7 +12,7 @@ use crate::kernel::{Drive, Kernel, Stimulus};
 use crate::netlist::ModuleBuilder;
 use crate::report::Checks;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout, Mark};
+use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
 /// From one interval's beginning to the next one's.
 const SLOT: Time = Time::from_ns(40);
@@ -110,7 +110,7 @@ fn begin(slot: i64) -> Time {
 }
 
 fn view() -> Layout {
-    let group = |title: &str, entries: &[Entry]| Group::new(title, entries.iter().cloned());
+    let group = |title: &str, entries: &[Entry]| SignalGroup::new(title, entries.iter().cloned());
     Layout {
         groups: vec![
             group(

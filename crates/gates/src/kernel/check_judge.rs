@@ -5,7 +5,7 @@
 
 use super::check_banks::{Bank, CLOCK, DATA, Data, RESET, SET};
 use super::check_report::{BINS, Policy, slack_bin};
-use super::timing_checks::{Found, History, NEVER, TimingChecks};
+use super::timing_checks::{History, MeasuredSlack, NEVER, TimingChecks};
 use crate::logic::Logic;
 use crate::netlist::{CheckKind, Control, Edge};
 
@@ -199,7 +199,7 @@ impl TimingChecks {
         let is_asynchronous = bank.is_asynchronous && kind.concerns_data();
         let tally = &mut self.summaries[kind as usize];
         let count = members.len() as u64;
-        let found = Found {
+        let found = MeasuredSlack {
             time_fs: self.now_fs,
             slack_fs,
             flip_flop: members[0],
@@ -215,21 +215,21 @@ impl TimingChecks {
             tally.checked += count;
             tally.histogram[slack_bin(slack_fs)] += count;
             // The first smallest; of one instant, the first in the netlist.
-            let rank = |f: &Found| (f.slack_fs, f.time_fs, f.flip_flop);
+            let rank = |f: &MeasuredSlack| (f.slack_fs, f.time_fs, f.flip_flop);
             if tally.worst.is_none_or(|worst| rank(&found) < rank(&worst)) {
                 tally.worst = Some(found);
             }
         }
         if slack_fs < 0 {
             for &flip_flop in members {
-                self.violated(Found { flip_flop, ..found });
+                self.violated(MeasuredSlack { flip_flop, ..found });
             }
         }
         slack_fs
     }
 
     #[cold]
-    fn violated(&mut self, found: Found) {
+    fn violated(&mut self, found: MeasuredSlack) {
         if self.found.len() < MOST_VIOLATIONS {
             self.found.push(found);
         } else {

@@ -46,7 +46,7 @@ impl Environment {
 
 /// A netlist in a library's cells.
 #[derive(Debug, Clone)]
-pub struct Characterised {
+pub struct CharacterisedNetlist {
     /// Delays and limits of every cell; those of cells with delays of their own are the library's, too.
     pub timing: Timing,
     /// Which drive of each stage, by cell.
@@ -59,7 +59,7 @@ pub struct Characterised {
 #[derive(Debug, Clone)]
 struct Block {
     cells: Range<usize>,
-    alone: Arc<(Netlist, Characterised)>,
+    alone: Arc<(Netlist, CharacterisedNetlist)>,
 }
 
 /// What nets do to the cells at them.
@@ -91,7 +91,7 @@ impl Liberty {
     /// Delays and limits of every cell of a netlist in this library's cells, by its load and the slews at its pins; cells with delays
     /// of their own keep these, as they are in the typical corner. Inputs have the slew of [`Environment::new`], and wires are left out.
     pub fn timing(&self, netlist: &Netlist) -> Timing {
-        let timing = Characterised::new(netlist, self, &Environment::new(self)).timing;
+        let timing = CharacterisedNetlist::new(netlist, self, &Environment::new(self)).timing;
         timing.with_own_delays(netlist, Corner::Typ, |cell| netlist.cell_path(cell))
     }
 
@@ -123,7 +123,7 @@ impl Liberty {
     }
 }
 
-impl Characterised {
+impl CharacterisedNetlist {
     /// Sizes and times a netlist. Nets without a driver have the environment's slew. A net that the library's strongest buffer is
     /// too weak for loads its driver with no more than that buffer could drive: such nets get trees of buffers in layout, which are no part
     /// of a netlist.
@@ -139,7 +139,8 @@ impl Characterised {
         environment: &Environment,
         is_block: impl Fn(&Module) -> bool,
     ) -> Self {
-        let mut known: HashMap<*const Module, Arc<(Netlist, Characterised)>> = HashMap::new();
+        let mut known: HashMap<*const Module, Arc<(Netlist, CharacterisedNetlist)>> =
+            HashMap::new();
         let mut blocks = Vec::new();
         let mut scope = 1;
         while let Some(at) = netlist.scopes().get(scope) {
@@ -159,7 +160,7 @@ impl Characterised {
             });
             scope += at.subtree;
         }
-        let mut work = Work::new(netlist, &library.map, environment, blocks);
+        let mut work = Characterisation::new(netlist, &library.map, environment, blocks);
         // Stronger drives load what is before them, which may then need to be stronger, too. Three rounds are chosen.
         for _ in 0..3 {
             work.size();
@@ -218,7 +219,7 @@ impl Characterised {
     }
 
     /// The shortest and the longest delay of any instance in `netlist`, fs as its tables give them, each with the library's cells that it is of
-    /// and where they stand. Delays of [`Characterised::timing`] are whole, from 0 to 4.295 us.
+    /// and where they stand. Delays of [`CharacterisedNetlist::timing`] are whole, from 0 to 4.295 us.
     pub fn extreme_delays(&self, netlist: &Netlist, library: &Liberty) -> [(f64, String); 2] {
         let mut extremes = [(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)];
         for (index, cell) in netlist.cells().iter().enumerate() {
@@ -300,7 +301,7 @@ fn most_load(map: &CellMap, slew_fs: f64) -> f64 {
     low
 }
 
-struct Work<'w> {
+struct Characterisation<'w> {
     netlist: &'w Netlist,
     map: &'w CellMap,
     environment: &'w Environment,
@@ -315,7 +316,7 @@ struct Work<'w> {
     readers: Vec<Vec<u32>>,
 }
 
-impl<'w> Work<'w> {
+impl<'w> Characterisation<'w> {
     fn new(
         netlist: &'w Netlist,
         map: &'w CellMap,
@@ -336,7 +337,7 @@ impl<'w> Work<'w> {
                 readers[net.index()].push(index as u32);
             }
         }
-        Work {
+        Characterisation {
             netlist,
             map,
             environment,
@@ -437,7 +438,7 @@ impl<'w> Work<'w> {
         }
     }
 
-    fn finish(self) -> Characterised {
+    fn finish(self) -> CharacterisedNetlist {
         let mut timing = Timing::of_library(self.netlist, &Library::generic_40nm(), Corner::Typ);
         let mut adopted = HashMap::new();
         for block in &self.blocks {
@@ -454,7 +455,7 @@ impl<'w> Work<'w> {
                 timing.set_limits(index, limits);
             }
         }
-        Characterised {
+        CharacterisedNetlist {
             timing,
             drives: self.drives,
             nets: self.nets,

@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
 use super::cell::{CellModel, FlipFlop, Role};
-use super::characterised::Characterised;
+use super::characterised::CharacterisedNetlist;
 use super::function::TruthTable;
 use super::read::Liberty;
 use super::verilog_name::in_verilog;
@@ -27,7 +27,7 @@ pub fn write_mapped_cells(
     out: &mut dyn Write,
     netlist: &Netlist,
     library: &Liberty,
-    characterised: &Characterised,
+    characterised: &CharacterisedNetlist,
 ) -> io::Result<()> {
     let mut models = BTreeMap::new();
     for index in 0..netlist.cells().len() {

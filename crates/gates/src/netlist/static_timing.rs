@@ -321,7 +321,7 @@ impl Arrivals<'_> {
                 let path = self.netlist.cell_path(cause.cell);
                 format!("{path} {} {}", kind.name(), kind.inputs()[cause.pin])
             };
-            steps.push(Step {
+            steps.push(PathStep {
                 arc: arrival.cause.map(cell),
                 net: net_of(index),
                 edge: edge_of(index),
@@ -346,7 +346,7 @@ impl Arrivals<'_> {
 
 /// One change on a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Step {
+pub struct PathStep {
     /// The arc that causes it: cell path, kind and input pin. `None` at the start.
     pub arc: Option<String>,
     /// Which net changes.
@@ -361,7 +361,7 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Path {
     /// Changes in order, the start first.
-    pub steps: Vec<Step>,
+    pub steps: Vec<PathStep>,
 }
 
 impl Path {

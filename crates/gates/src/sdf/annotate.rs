@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
+use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, SkippedEntry};
 use crate::InputError;
 use crate::netlist::{ArcDelay, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing};
 
@@ -16,7 +16,7 @@ pub struct Annotation {
     /// Timing checks of single instances whose limits were taken over.
     pub checks: usize,
     /// Delays and limits that could not be taken over as they are.
-    pub notes: Vec<Skipped>,
+    pub notes: Vec<SkippedEntry>,
     /// Longest wire delay left out because it ends at a flip-flop's D, fs.
     pub longest_wire_to_d_fs: i64,
 }
@@ -100,7 +100,7 @@ impl Annotator<'_, '_, '_> {
     }
 
     pub(super) fn note(&mut self, what: &'static str, line: usize) {
-        Skipped::count(&mut self.result.notes, what, line);
+        SkippedEntry::count(&mut self.result.notes, what, line);
     }
 
     fn cell(&mut self, timing: &mut Timing, entry: &SdfCell<'_>) -> Result<(), InputError> {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::parser::{Parser, Result};
 use super::tokens::Token;
-use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, Skipped, Triple};
+use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, SkippedEntry, Triple};
 use crate::netlist::Edge;
 
 /// Longest delay or limit, fs: 4.29 µs, what delays are stored in.
@@ -62,7 +62,7 @@ impl<'a> Parser<'a, '_> {
         while self.is_next(Token::Open)? {
             self.next_token()?;
             if matches!(self.peek()?, Token::Word(w) if w.eq_ignore_ascii_case("RETAIN")) {
-                Skipped::count(&mut self.skipped, "RETAIN", self.line);
+                SkippedEntry::count(&mut self.skipped, "RETAIN", self.line);
                 self.skip_list()?;
                 continue;
             }
@@ -70,7 +70,7 @@ impl<'a> Parser<'a, '_> {
                 self.next_token()?;
                 let value = self.triple()?;
                 if !self.is_next(Token::Close)? {
-                    Skipped::count(&mut self.skipped, "pulse limits", self.line);
+                    SkippedEntry::count(&mut self.skipped, "pulse limits", self.line);
                 }
                 self.skip_list()?;
                 value
@@ -87,7 +87,7 @@ impl<'a> Parser<'a, '_> {
         }
         self.close()?;
         if values.len() > 2 {
-            Skipped::count(&mut self.skipped, "transitions to and from Z", self.line);
+            SkippedEntry::count(&mut self.skipped, "transitions to and from Z", self.line);
         }
         match values[..] {
             [] => self.error("a delay has no value; give it one in parentheses"),
@@ -185,7 +185,7 @@ impl<'a> Parser<'a, '_> {
         }
         // A check that holds only sometimes must not become one that always does.
         if conditional {
-            Skipped::count(&mut self.skipped, "COND", line);
+            SkippedEntry::count(&mut self.skipped, "COND", line);
             return Ok(None);
         }
         Ok(Some(SdfCheck {

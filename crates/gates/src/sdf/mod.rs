@@ -247,7 +247,7 @@ pub struct SdfHeader<'a> {
 
 /// Something left out of a file or an annotation.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Skipped {
+pub struct SkippedEntry {
     /// What it was.
     pub what: &'static str,
     /// How often.
@@ -256,11 +256,11 @@ pub struct Skipped {
     pub first_line: usize,
 }
 
-impl Skipped {
-    fn count(list: &mut Vec<Skipped>, what: &'static str, line: usize) {
+impl SkippedEntry {
+    fn count(list: &mut Vec<SkippedEntry>, what: &'static str, line: usize) {
         match list.iter_mut().find(|s| s.what == what) {
             Some(skipped) => skipped.count += 1,
-            None => list.push(Skipped {
+            None => list.push(SkippedEntry {
                 what,
                 count: 1,
                 first_line: line,
@@ -279,7 +279,7 @@ pub struct Sdf<'a> {
     /// Its entries in file order.
     pub cells: Vec<SdfCell<'a>>,
     /// Constructs of the format that are not modelled.
-    pub skipped: Vec<Skipped>,
+    pub skipped: Vec<SkippedEntry>,
 }
 
 impl Sdf<'_> {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::tokens::{Token, Tokens};
-use super::{Sdf, SdfCell, SdfHeader, SdfInstance, Skipped};
+use super::{Sdf, SdfCell, SdfHeader, SdfInstance, SkippedEntry};
 use crate::InputError;
 
 const HEADER_TEXTS: [&str; 9] = [
@@ -70,7 +70,7 @@ pub(super) struct Parser<'a, 's> {
     /// Line of the last token taken.
     pub(super) line: usize,
     pub(super) header: SdfHeader<'a>,
-    pub(super) skipped: Vec<Skipped>,
+    pub(super) skipped: Vec<SkippedEntry>,
 }
 
 impl<'a> Parser<'a, '_> {
@@ -164,7 +164,7 @@ impl<'a> Parser<'a, '_> {
     pub(super) fn leave_out(&mut self, keyword: &str) -> Result<()> {
         match LEFT_OUT.iter().find(|k| **k == keyword) {
             Some(what) => {
-                Skipped::count(&mut self.skipped, what, self.line);
+                SkippedEntry::count(&mut self.skipped, what, self.line);
                 self.skip_list()
             }
             None => {

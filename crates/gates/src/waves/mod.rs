@@ -43,8 +43,8 @@ mod vcd;
 mod writer;
 
 pub use fst::{Fst, FstWriter};
-pub use layout::{Entry, Group, Layout, Mark, Radix, mark};
+pub use layout::{Entry, Layout, Mark, Radix, SignalGroup, mark};
 pub use saif::write_saif;
-pub use selection::Selection;
+pub use selection::WaveSelection;
 pub use vcd::{Vcd, VcdWriter};
 pub use writer::{Format, WaveWriter};

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::io;
 use std::ops::Range;
 
-use super::selection::{Coverage, Selection};
+use super::selection::{Coverage, WaveSelection};
 use crate::netlist::{NetId, Netlist};
 
 /// Marks a net that is not shown as a scalar.
@@ -62,7 +62,7 @@ impl Variables {
     /// Those of `out`, and a path in `selection` that does not exist.
     pub(super) fn declare(
         netlist: &Netlist,
-        selection: &Selection,
+        selection: &WaveSelection,
         out: &mut impl Declare,
     ) -> io::Result<Self> {
         let coverage = selection.coverage(netlist)?;

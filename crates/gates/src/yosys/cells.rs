@@ -5,7 +5,7 @@ mod library;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::{Bit, Placed, YosysError};
+use super::{Bit, CellEntry, YosysError};
 use crate::netlist::CellKind::{
     self, And2, Buf, Dffr, Dffsr, Inv, Mux2, Nand2, Nor2, Or2, Xnor2, Xor2,
 };
@@ -37,13 +37,13 @@ pub(super) struct Placing<'d> {
 }
 
 /// One cell as Yosys has it.
-struct Given<'d> {
+struct YosysCell<'d> {
     name: &'d str,
-    of: &'d Placed,
+    of: &'d CellEntry,
     inverses: &'d HashMap<u64, u64>,
 }
 
-impl Given<'_> {
+impl YosysCell<'_> {
     fn inverse_of_q(&self) -> Option<u64> {
         match self.of.connections.get("Q")?.as_slice() {
             [Bit::Net(q)] => self.inverses.get(q).copied(),
@@ -78,13 +78,13 @@ impl<'d> Placing<'d> {
     pub(super) fn cell(
         &mut self,
         name: &str,
-        of: &Placed,
+        of: &CellEntry,
         inverses: &HashMap<u64, u64>,
     ) -> Result<(), YosysError> {
         if of.kind == "$scopeinfo" {
             return Ok(());
         }
-        if place(self, &Given { name, of, inverses })? {
+        if place(self, &YosysCell { name, of, inverses })? {
             Ok(())
         } else {
             Err(YosysError::Cell {
@@ -152,7 +152,7 @@ impl<'d> Placing<'d> {
     /// A flip-flop with reset and set, active high, where it has them.
     fn flip_flop(
         &mut self,
-        given: &Given<'_>,
+        given: &YosysCell<'_>,
         [data, clock]: [Net; 2],
         controls: [Option<Net>; 2],
         [q, qn]: [Option<Net>; 2],
@@ -176,7 +176,7 @@ impl<'d> Placing<'d> {
     /// A constant that a cell needs at a pin.
     fn constant_for(
         &mut self,
-        given: &Given<'_>,
+        given: &YosysCell<'_>,
         pin: &str,
         value: bool,
     ) -> Result<Net, YosysError> {
@@ -189,7 +189,7 @@ impl<'d> Placing<'d> {
         })
     }
 
-    fn pin(&mut self, given: &Given<'_>, pin: &str) -> Result<Net, YosysError> {
+    fn pin(&mut self, given: &YosysCell<'_>, pin: &str) -> Result<Net, YosysError> {
         let problem = match given.of.connections.get(pin).map(Vec::as_slice) {
             Some([bit]) => match self.net(bit) {
                 Some(net) => return Ok(net),
@@ -207,13 +207,17 @@ impl<'d> Placing<'d> {
         })
     }
 
-    fn pins(&mut self, given: &Given<'_>, pins: &[&'static str]) -> Result<Vec<Net>, YosysError> {
+    fn pins(
+        &mut self,
+        given: &YosysCell<'_>,
+        pins: &[&'static str],
+    ) -> Result<Vec<Net>, YosysError> {
         pins.iter().map(|&pin| self.pin(given, pin)).collect()
     }
 }
 
 /// Places the cells that do what a cell of this type does; false where there are none.
-fn place(to: &mut Placing<'_>, given: &Given<'_>) -> Result<bool, YosysError> {
+fn place(to: &mut Placing<'_>, given: &YosysCell<'_>) -> Result<bool, YosysError> {
     let kind = given.of.kind.as_str();
     if let Some(function) = &given.of.of_library {
         library::place(to, given, function)?;
@@ -357,7 +361,7 @@ impl FlipFlop {
         })
     }
 
-    fn place(&self, to: &mut Placing<'_>, given: &Given<'_>) -> Result<(), YosysError> {
+    fn place(&self, to: &mut Placing<'_>, given: &YosysCell<'_>) -> Result<(), YosysError> {
         let mut data = to.pin(given, "D")?;
         let q = to.pin(given, "Q")?;
         let qn = given.inverse_of_q().and_then(|n| to.nets.get(&n).copied());
@@ -412,7 +416,7 @@ impl FlipFlop {
     fn enabled(
         &self,
         to: &mut Placing<'_>,
-        given: &Given<'_>,
+        given: &YosysCell<'_>,
         data: Net,
         q: Net,
     ) -> Result<Net, YosysError> {

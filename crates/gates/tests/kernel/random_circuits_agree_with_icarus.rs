@@ -31,7 +31,7 @@ use femtogate::netlist::{Corner, Netlist, Timing};
 use femtogate::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use femtogate::units::Time;
 use femtogate::verilog::{write_cells, write_delays, write_modules, write_parametric_cells};
-use femtogate::waves::{Selection, VcdWriter};
+use femtogate::waves::{VcdWriter, WaveSelection};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, FileFailurePersistence, TestCaseError, TestError, TestRunner};
 use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
@@ -55,7 +55,7 @@ fn simulate(
     netlist: &Netlist,
     drives: Vec<Drive>,
     end: Time,
-    selection: &Selection,
+    selection: &WaveSelection,
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
     let mut kernel = Kernel::new(netlist, timing);
@@ -111,7 +111,7 @@ fn prepared(case: &Case, index: usize) -> Prepared {
     let parameters = String::from_utf8(parameters).unwrap();
     let bench = testbench(&top, &netlist, &drives, &parameters);
     let verilog = String::from_utf8(verilog).unwrap() + &bench;
-    let selection = Selection::all().with_anonymous();
+    let selection = WaveSelection::all().with_anonymous();
     Prepared {
         verilog: with_modules_numbered(&verilog, index),
         ours: simulate(&ours, &netlist, drives, end, &selection),
@@ -245,7 +245,7 @@ fn compare_shuffled(case: &Case, seed: u64) -> Result<Figures, TestCaseError> {
     shuffled.shuffle(random);
     shuffled.sort_by_key(|drive| drive.time);
     // Numbers of unnamed nets depend on the order, too.
-    let named = Selection::all();
+    let named = WaveSelection::all();
     let timing = netlists.each_ref().map(|netlist| case.timing(netlist));
     let waves = simulate(&timing[0], &netlists[0], drives, end, &named);
     let shuffled = simulate(&timing[1], &netlists[1], shuffled, end, &named);

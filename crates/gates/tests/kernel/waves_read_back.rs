@@ -17,7 +17,7 @@ use femtogate::netlist::{
     CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist, Timing, TimingArc,
 };
 use femtogate::units::Time;
-use femtogate::waves::{FstWriter, Selection, VcdWriter};
+use femtogate::waves::{FstWriter, VcdWriter, WaveSelection};
 use proptest::prelude::*;
 
 /// Times (fs) and values of one signal, first the initial one.
@@ -157,7 +157,7 @@ fn simulate(
 ) -> Simulated {
     let end = drives.last().unwrap().time + Time::from_ns(3);
     let mut stimulus = Stimulus::new(drives);
-    let selection = Selection::all().with_anonymous();
+    let selection = WaveSelection::all().with_anonymous();
     let mut vcd = VcdWriter::new(Vec::new(), netlist, &selection).unwrap();
     let mut fst = FstWriter::new(Cursor::new(Vec::new()), netlist, &selection).unwrap();
     let mut span = Time::ZERO..=end;

@@ -207,7 +207,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::theory::detection::{Model, PerCycle, Ties, probability};
+    use crate::theory::detection::{DetectionModel, PerCycle, Ties, probability};
 
     fn echo(signal: f64, background: f64, sigma_bins: f64) -> SpreadEcho {
         SpreadEcho {
@@ -300,7 +300,7 @@ mod tests {
         ) {
             let short = echo(signal, background, 0.0).detection(cycles, Hits::OneACycle);
             let light = PerCycle { signal, background, bins: 16 };
-            let one_bin = probability(&light, cycles, Model::Bernoulli(Ties::Random));
+            let one_bin = probability(&light, cycles, DetectionModel::Bernoulli(Ties::Random));
             // The neighbour's lucky peak counts as right too, one of fifteen.
             let neighbour = one_bin.miss / 15.0;
             prop_assert!((short.probability - one_bin.probability - neighbour).abs() < 1e-6);

@@ -220,7 +220,7 @@ fn solve([a, b, d]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
     use proptest::prelude::*;
 
     const PITCH: Pitch = [4.4e-3; 2];
@@ -236,7 +236,7 @@ mod tests {
         let places = (0..9u32).map(|n| [f64::from(n % 3), f64::from(n / 3)]);
         let samples = (0..).zip(places).map(|(n, place)| {
             let at = [0, 1].map(|axis| (place[axis] - 1.0) / 3.0 + phase[axis]);
-            let error = sigma * normal(&mut random_stream(seed, Purpose::Guide, n, 98));
+            let error = sigma * normal(&mut random_stream(seed, RandomPurpose::Guide, n, 98));
             Sample {
                 at,
                 inverse: middle + slope[0] * at[0] + slope[1] * at[1] + error,

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use super::facet::{self, Sample};
 use super::{Guide, GuideError, GuideInput, GuideMap};
-use crate::photon::{PixelLight, Poisson, Purpose, normal, random_stream};
+use crate::photon::{PixelLight, Poisson, RandomPurpose, normal, random_stream};
 use crate::scene::{DVec3, GroundTruth, Scene};
 use crate::settings::Range::Within;
 use crate::settings::keys;
@@ -79,7 +79,7 @@ impl IntensityStereo {
         };
         let pixels = light.par_iter().enumerate().map(|(pixel, light)| {
             let mean = mean(light);
-            let mut random = random_stream(input.seed, Purpose::Guide, pixel as u32, draws);
+            let mut random = random_stream(input.seed, RandomPurpose::Guide, pixel as u32, draws);
             if mean < MANY {
                 f64::from(Poisson::new(mean).draw(&mut random))
             } else {
@@ -296,7 +296,7 @@ mod tests {
     /// Noise alone has a fifth of the variance that is asked for.
     #[test]
     fn a_pattern_stands_out_of_noise() {
-        let stream = |pixel| random_stream(7, Purpose::Guide, pixel, 0);
+        let stream = |pixel| random_stream(7, RandomPurpose::Guide, pixel, 0);
         let noisy = |mean: &dyn Fn(u32) -> f64| -> f64 {
             let counts = (0..1024)
                 .map(|pixel| f64::from(Poisson::new(mean(pixel)).draw(&mut stream(pixel))));

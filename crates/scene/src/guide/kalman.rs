@@ -169,7 +169,7 @@ impl Guide for Kalman {
 mod tests {
     use super::*;
     use crate::guide::test_scenes::wall_at;
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
 
     /// Frames `dt_s` apart, in which every macropixel measures `range_m(frame)`.
     fn frames(
@@ -230,7 +230,7 @@ mod tests {
         let mut last_m = vec![0.0; PIXELS];
         let mut measured = vec![vec![None; PIXELS]; count];
         for pixel in 0..PIXELS {
-            let mut random = random_stream(5, Purpose::Guide, pixel as u32, 99);
+            let mut random = random_stream(5, RandomPurpose::Guide, pixel as u32, 99);
             let (mut range_m, mut speed_m_s) = (60.0, guide.speed_m_s * normal(&mut random));
             for (frame, measured) in measured.iter_mut().enumerate() {
                 if frame > 0 {

@@ -21,7 +21,7 @@
 use rayon::prelude::*;
 
 use super::{Guide, GuideError, GuideInput, GuideMap};
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::{DVec3, Ray, Scene, Stage};
 use crate::settings::Range::{Above, Within};
 use crate::settings::keys;
@@ -185,7 +185,7 @@ impl Guide for Radar {
             .map(|number| {
                 let echoes = self.echoes(&stage, each[number as usize]);
                 let (range_m, spread_m2) = self.strongest(&echoes)?;
-                let mut random = random_stream(input.seed, Purpose::Guide, number, DRAWS);
+                let mut random = random_stream(input.seed, RandomPurpose::Guide, number, DRAWS);
                 let measured_m = range_m + self.range_sigma_m * normal(&mut random);
                 let sigma_m = (self.range_sigma_m.powi(2) + spread_m2).sqrt();
                 Some((measured_m.max(0.0), sigma_m))

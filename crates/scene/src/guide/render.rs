@@ -17,7 +17,7 @@ use smallvec::SmallVec;
 use super::GuideInput;
 use super::right_camera::RightCamera;
 use crate::numerics::branchless;
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::{Bounds, PinholeCamera, Ray, SKY_REFLECTIVITY, Scene, Stage};
 use crate::stereo::GreyImage;
 
@@ -274,7 +274,7 @@ fn expose(
     let rows = radiances.par_chunks(width).enumerate();
     let pixels: Vec<u16> = rows
         .flat_map_iter(|(row, radiances)| {
-            let mut random = random_stream(seed, Purpose::Stereo, row as u32, side);
+            let mut random = random_stream(seed, RandomPurpose::Stereo, row as u32, side);
             radiances.iter().map(move |&radiance| {
                 let signal_e = f64::from(radiance) * electrons;
                 let noise_e = (signal_e + READ_NOISE_E * READ_NOISE_E * binned).sqrt();

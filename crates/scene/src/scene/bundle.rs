@@ -76,7 +76,7 @@ impl Bundle {
     }
 
     /// The normal of a surface where the bundle ends, `range_m` from its beginning, as its beginning sees it
-    /// ([`Return::facing`](super::Return::facing)), and how much of the light is left that would be there at this range without a mirror's curvature.
+    /// ([`SurfaceReturn::facing`](super::SurfaceReturn::facing)), and how much of the light is left that would be there at this range without a mirror's curvature.
     pub(super) fn onto(&self, direction: DVec3, normal: DVec3, range_m: f64) -> (DVec3, f64) {
         let across = self.beside.map(|ray| ray.turn * ray.moved_m.dot(normal));
         let facing = self.look * direction.dot(normal) + (across[0] + across[1]) / range_m;

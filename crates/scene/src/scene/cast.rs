@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::bounds::Candidates;
 use super::bundle::{Bundle, reflected};
 use super::settings::Scene;
-use super::shape::{Meeting, Placed, Shape};
+use super::shape::{Meeting, PlacedShape, Shape};
 use super::vector::Ray;
 
 #[cfg(test)]
@@ -33,7 +33,7 @@ pub struct Hit {
 
 /// A surface that sends light back along a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Return {
+pub(crate) struct SurfaceReturn {
     /// The surface; its range is the whole way to it, its normal is turned against the light that meets it.
     pub hit: Hit,
     /// Where the ray meets it, m: over a mirror not on the ray's own line.
@@ -62,9 +62,9 @@ pub(crate) struct End {
 
 /// All that sends light back along a ray, nearest first.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Returns {
+pub(crate) struct SurfaceReturns {
     /// Surfaces; none where there is only sky.
-    pub surfaces: SmallVec<[Return; 2]>,
+    pub surfaces: SmallVec<[SurfaceReturn; 2]>,
     /// Where light ends; each of its shares is 1 in all.
     pub ends: SmallVec<[End; 2]>,
     /// Share of the sky's light that arrives, 0 to 1.
@@ -90,7 +90,7 @@ impl Scene {
     /// Light goes there and back the same way, so what is left of it is a share of a share: a plane mirror shows what stands before
     /// it as far behind it. A pane's thickness, and light that goes one way over a mirror and the other past it, are left out.
     #[cfg(test)]
-    pub(crate) fn returns(&self, ray: &Ray) -> Returns {
+    pub(crate) fn returns(&self, ray: &Ray) -> SurfaceReturns {
         let stage = Stage::new(self);
         stage.followed(ray, stage.first_meeting(ray, stage.all()), None)
     }
@@ -101,7 +101,7 @@ impl Scene {
 pub struct Stage<'a> {
     /// What was made ready.
     pub(crate) scene: &'a Scene,
-    placed: Vec<Placed<'a>>,
+    placed: Vec<PlacedShape<'a>>,
     /// Balls around the objects, for rays that do not come from one place.
     balls: Vec<Option<(DVec3, f64)>>,
     /// Towards the sun.
@@ -112,7 +112,7 @@ pub struct Stage<'a> {
 
 /// How far light has come along a ray.
 #[derive(Debug, Clone, Copy)]
-struct Way {
+struct RayProgress {
     so_far_m: f64,
     /// Share of it that arrives one way.
     share: f64,
@@ -121,9 +121,9 @@ struct Way {
     bundle: Option<Bundle>,
 }
 
-impl Default for Way {
+impl Default for RayProgress {
     fn default() -> Self {
-        Way {
+        RayProgress {
             so_far_m: 0.0,
             share: 1.0,
             mirrors: 0,
@@ -175,12 +175,17 @@ impl<'a> Stage<'a> {
     }
 
     /// As [`Scene::returns`], where the ray meets no others than the `candidates`.
-    pub(crate) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> Returns {
+    pub(crate) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> SurfaceReturns {
         self.returns_from(ray, self.meeting_of(ray, candidates), candidates)
     }
 
     /// The same for a ray that first meets what [`Stage::meeting_of`] says.
-    pub(super) fn returns_from(&self, ray: &Ray, first: First, candidates: &Candidates) -> Returns {
+    pub(super) fn returns_from(
+        &self,
+        ray: &Ray,
+        first: First,
+        candidates: &Candidates,
+    ) -> SurfaceReturns {
         self.followed(ray, first, Some(candidates))
     }
 
@@ -189,14 +194,15 @@ impl<'a> Stage<'a> {
         first.is_none_or(|(_, object)| self.scene.objects[object].ends_rays())
     }
 
-    fn followed(&self, ray: &Ray, first: First, candidates: Option<&Candidates>) -> Returns {
-        let mut returns = Returns {
+    fn followed(&self, ray: &Ray, first: First, candidates: Option<&Candidates>) -> SurfaceReturns {
+        let mut returns = SurfaceReturns {
             surfaces: SmallVec::new(),
             ends: SmallVec::new(),
             sky_share: 0.0,
         };
-        self.follow(ray, first, candidates, Way::default(), &mut returns);
-        let by_range = |a: &Return, b: &Return| a.hit.range_m.total_cmp(&b.hit.range_m);
+        self.follow(ray, first, candidates, RayProgress::default(), &mut returns);
+        let by_range =
+            |a: &SurfaceReturn, b: &SurfaceReturn| a.hit.range_m.total_cmp(&b.hit.range_m);
         returns.surfaces.sort_by(by_range);
         returns
     }
@@ -208,10 +214,10 @@ impl<'a> Stage<'a> {
         ray: &Ray,
         first: First,
         candidates: Option<&Candidates>,
-        way: Way,
-        returns: &mut Returns,
+        way: RayProgress,
+        returns: &mut SurfaceReturns,
     ) {
-        let Way {
+        let RayProgress {
             so_far_m, share, ..
         } = way;
         let Some((meeting, index)) = first else {
@@ -233,7 +239,7 @@ impl<'a> Stage<'a> {
                 None => (hit.normal, 1.0),
                 Some(bundle) => bundle.onto(ray.direction, hit.normal, hit.range_m),
             };
-            returns.surfaces.push(Return {
+            returns.surfaces.push(SurfaceReturn {
                 hit,
                 place_m: point,
                 facing,
@@ -261,7 +267,7 @@ impl<'a> Stage<'a> {
                 Some(candidates) => self.meeting_of(&beyond, candidates),
                 None => self.first_meeting(&beyond, self.all()),
             };
-            let onwards = Way {
+            let onwards = RayProgress {
                 so_far_m,
                 share,
                 bundle,
@@ -275,7 +281,7 @@ impl<'a> Stage<'a> {
             let placed = &self.placed[index];
             let outward = placed.normal_at(point, meeting.part);
             let bend = |step_m| placed.bend(meeting.part, step_m);
-            let back = Way {
+            let back = RayProgress {
                 so_far_m,
                 share,
                 mirrors: way.mirrors + 1,

@@ -154,40 +154,40 @@ impl From<Curve> for Vec<[f64; 2]> {
 /// One of some words, or a measured curve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Measured<Word> {
+pub enum CurveSetting<Word> {
     /// What needs no measurement.
     Word(Word),
     /// A curve.
     Curve(Curve),
 }
 
-impl<Word> Measured<Word> {
+impl<Word> CurveSetting<Word> {
     /// The curve, if it is one.
     pub(crate) fn curve(&self) -> Option<&Curve> {
         match self {
-            Measured::Word(_) => None,
-            Measured::Curve(curve) => Some(curve),
+            CurveSetting::Word(_) => None,
+            CurveSetting::Curve(curve) => Some(curve),
         }
     }
 }
 
-impl<Word: Default> Default for Measured<Word> {
+impl<Word: Default> Default for CurveSetting<Word> {
     fn default() -> Self {
-        Measured::Word(Word::default())
+        CurveSetting::Word(Word::default())
     }
 }
 
-impl<'de, Word: DeserializeOwned> Deserialize<'de> for Measured<Word> {
+impl<'de, Word: DeserializeOwned> Deserialize<'de> for CurveSetting<Word> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let said = |e: toml::de::Error| D::Error::custom(e.message().trim());
         match Value::deserialize(deserializer)? {
             Value::String(word) => {
                 let word = Word::deserialize(Value::String(word)).map_err(said)?;
-                Ok(Measured::Word(word))
+                Ok(CurveSetting::Word(word))
             }
             Value::Array(pairs) => {
                 let curve = Curve::deserialize(Value::Array(pairs)).map_err(said)?;
-                Ok(Measured::Curve(curve))
+                Ok(CurveSetting::Curve(curve))
             }
             other => {
                 let message = format!("{other} is neither a word nor a list of pairs of numbers");

@@ -21,7 +21,7 @@ use serde::Serialize;
 
 use super::settings::Scene;
 use super::words::BeamWord;
-use super::{Measured, PinholeCamera};
+use super::{CurveSetting, PinholeCamera};
 
 /// Time over which an unintended look is averaged, s.
 const TIME_BASE_S: f64 = 100.0;
@@ -341,7 +341,7 @@ impl Scene {
         if let Some(curve) = beam.curve() {
             return curve.greatest() / self.lidar.beam_total();
         }
-        if *beam == Measured::Word(BeamWord::Gaussian) {
+        if *beam == CurveSetting::Word(BeamWord::Gaussian) {
             return 1.0 / self.lidar.beam_total();
         }
         // All macropixels get the same, and one in a corner sees the smallest solid angle.

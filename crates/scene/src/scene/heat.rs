@@ -11,7 +11,7 @@
 //! An excess bias V makes an avalanche of a carrier with the probability 1 − exp(−V/V₀): Otte et al., arXiv:1606.05186, who operate at
 //! 90 % of what can be had. That and all keys hold at 25 °C, where every factor here is exactly 1.
 
-use super::curve::Measured;
+use super::curve::CurveSetting;
 use super::settings::{Lidar, REFERENCE_C};
 use crate::numerics::integrate;
 use crate::photon::{Filter, FilterShape};
@@ -60,8 +60,8 @@ impl Lidar {
     /// Detection efficiency at its temperature and its laser's wavelength, 0 to 1.
     pub fn warm_pde(&self) -> f64 {
         let of_wavelength = match &self.pde_curve {
-            Measured::Word(_) => 1.0,
-            Measured::Curve(curve) => {
+            CurveSetting::Word(_) => 1.0,
+            CurveSetting::Curve(curve) => {
                 let pde = |nm| curve.interpolate(nm).unwrap_or(0.0);
                 pde(self.warm_wavelength_nm()) / pde(self.wavelength_nm)
             }
@@ -92,7 +92,7 @@ impl Lidar {
             return self.filter_at(nm).unwrap_or(1.0);
         }
         let breaks = match &self.filter {
-            Measured::Word(word) => match word.shape() {
+            CurveSetting::Word(word) => match word.shape() {
                 None => return 1.0,
                 Some(shape) => {
                     let filter = self.filter_of(shape);
@@ -103,7 +103,7 @@ impl Lidar {
                     (-2..=2).map(edge).collect()
                 }
             },
-            Measured::Curve(curve) => {
+            CurveSetting::Curve(curve) => {
                 let points = curve.points.iter();
                 points.map(|[at, _]| at + self.filter_shift_nm()).collect()
             }

@@ -16,7 +16,7 @@
 use std::f64::consts::{LN_2, PI};
 
 use super::camera::PinholeCamera;
-use super::curve::{Curve, Measured};
+use super::curve::{Curve, CurveSetting};
 use super::settings::{Lidar, Scene};
 use super::words::{BeamWord, PdeWord, VignettingWord};
 use crate::numerics::integrate;
@@ -45,11 +45,11 @@ impl Lidar {
     /// sun's irradiance is known.
     pub(super) fn filter_at(&self, wavelength_nm: f64) -> Option<f64> {
         match &self.filter {
-            Measured::Curve(curve) => {
+            CurveSetting::Curve(curve) => {
                 let cold_nm = wavelength_nm - self.filter_shift_nm();
                 Some(curve.interpolate(cold_nm).unwrap_or(0.0))
             }
-            Measured::Word(word) => {
+            CurveSetting::Word(word) => {
                 let filter = self.filter_of(word.shape()?);
                 Some(filter.transmission(wavelength_nm))
             }
@@ -64,8 +64,8 @@ impl Lidar {
     /// Detection efficiency at a wavelength, relative to that at the laser's.
     pub(super) fn relative_pde(&self, wavelength_nm: f64) -> f64 {
         match &self.pde_curve {
-            Measured::Word(PdeWord::Flat) => 1.0,
-            Measured::Curve(curve) => {
+            CurveSetting::Word(PdeWord::Flat) => 1.0,
+            CurveSetting::Curve(curve) => {
                 let own = curve.interpolate(self.warm_wavelength_nm()).unwrap_or(0.0);
                 curve.interpolate(wavelength_nm).unwrap_or(0.0) / own
             }
@@ -75,11 +75,11 @@ impl Lidar {
     /// Sunlight in full sun (100 klux), W/m²: as much of the laser's wavelength gives as many detected photons.
     pub(super) fn effective_irradiance_w_m2(&self) -> f64 {
         let (from, to) = match &self.filter {
-            Measured::Curve(curve) => {
+            CurveSetting::Curve(curve) => {
                 let (from, to) = curve.ends();
                 (from + self.filter_shift_nm(), to + self.filter_shift_nm())
             }
-            Measured::Word(word) => match word.shape() {
+            CurveSetting::Word(word) => match word.shape() {
                 None => return self.solar_irradiance_w_m2,
                 Some(shape) => self.filter_of(shape).passband_nm(),
             },
@@ -95,10 +95,10 @@ impl Lidar {
         let (centre_nm, fwhm_nm) = (self.filter_centre_nm + shift_nm, self.filter_fwhm_nm);
         breaks.extend((-16..=16).map(|k| centre_nm + f64::from(k) * fwhm_nm / 4.0));
         let own = |curve: &Curve| -> Vec<f64> { curve.points.iter().map(|[nm, _]| *nm).collect() };
-        if let Measured::Curve(curve) = &self.filter {
+        if let CurveSetting::Curve(curve) = &self.filter {
             breaks.extend(own(curve).iter().map(|nm| nm + shift_nm));
         }
-        if let Measured::Curve(curve) = &self.pde_curve {
+        if let CurveSetting::Curve(curve) = &self.pde_curve {
             breaks.extend(own(curve));
         }
         breaks.retain(|nm| (from..=to).contains(nm));
@@ -148,7 +148,7 @@ impl Lidar {
                 "spad_tail_share means nothing without a time constant; give spad_tail_ps, too";
             return fault("spad_tail_share", message.into());
         }
-        if let Measured::Curve(curve) = &self.filter
+        if let CurveSetting::Curve(curve) = &self.filter
             && curve.greatest() > 1.0
         {
             let message = format!(
@@ -157,7 +157,7 @@ impl Lidar {
             );
             return fault("filter", message);
         }
-        if let Measured::Curve(curve) = &self.pde_curve
+        if let CurveSetting::Curve(curve) = &self.pde_curve
             && let Some(nm) = [self.wavelength_nm, nm]
                 .into_iter()
                 .find(|&nm| curve.interpolate(nm).unwrap_or(0.0) <= 0.0)
@@ -204,14 +204,14 @@ impl Lidar {
     /// Intensity of the beam at an angle off the axis, in any unit; `None` for one that gives all macropixels the same.
     pub(super) fn beam_at(&self, angle_rad: f64) -> Option<f64> {
         match &self.beam {
-            Measured::Word(BeamWord::Uniform) => None,
-            Measured::Word(BeamWord::Gaussian) => {
+            CurveSetting::Word(BeamWord::Uniform) => None,
+            CurveSetting::Word(BeamWord::Gaussian) => {
                 let half_widths = 2.0 * angle_rad.to_degrees() / self.beam_fwhm_deg;
                 Some(libm::exp(
                     -std::f64::consts::LN_2 * half_widths * half_widths,
                 ))
             }
-            Measured::Curve(curve) => {
+            CurveSetting::Curve(curve) => {
                 Some(curve.interpolate(angle_rad.to_degrees()).unwrap_or(0.0))
             }
         }
@@ -235,9 +235,9 @@ impl Lidar {
     /// Relative illumination at an angle off the axis.
     fn illumination_at(&self, cosine: f64) -> Option<f64> {
         match &self.vignetting {
-            Measured::Word(VignettingWord::None) => None,
-            Measured::Word(VignettingWord::Cos4) => Some(cosine.powi(4)),
-            Measured::Curve(curve) => {
+            CurveSetting::Word(VignettingWord::None) => None,
+            CurveSetting::Word(VignettingWord::Cos4) => Some(cosine.powi(4)),
+            CurveSetting::Curve(curve) => {
                 let [[_, middle], ..] = curve.points[..] else {
                     return Some(0.0);
                 };
@@ -284,7 +284,7 @@ impl Scene {
         let uniform = lidar
             .spot
             .share_per_pixel(camera.height, camera.width, pitch);
-        let total = lidar.beam.curve().is_some() || lidar.beam != Measured::default();
+        let total = lidar.beam.curve().is_some() || lidar.beam != CurveSetting::default();
         let total = total.then(|| lidar.beam_total());
         let pixels =
             (0..camera.height).flat_map(|row| (0..camera.width).map(move |col| (row, col)));

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::curve::Measured;
+use super::curve::CurveSetting;
 use super::illumination::Falling;
 use super::settings::{Lidar, Scene};
 use crate::photon::{Glint, PulseTrain, merged};
@@ -48,8 +48,8 @@ impl Halo {
         let strength = |row: f64, col: f64| {
             let away = libm::hypot(row * aspect, col);
             match &lidar.stray {
-                Measured::Word(_) => libm::pow(1.0 + (away / radius).powi(2), -1.5),
-                Measured::Curve(curve) => curve.interpolate(away).unwrap_or(0.0),
+                CurveSetting::Word(_) => libm::pow(1.0 + (away / radius).powi(2), -1.5),
+                CurveSetting::Curve(curve) => curve.interpolate(away).unwrap_or(0.0),
             }
         };
         let cells = (-SUMMED..=SUMMED)
@@ -64,10 +64,10 @@ impl Halo {
         // Beyond, the integral of the power.
         let end = f64::from(SUMMED) * aspect.min(1.0);
         let far = match &lidar.stray {
-            Measured::Word(_) => {
+            CurveSetting::Word(_) => {
                 std::f64::consts::TAU * radius.powi(3) / libm::hypot(radius, end) / aspect
             }
-            Measured::Curve(_) => 0.0,
+            CurveSetting::Curve(_) => 0.0,
         };
         let unit = lidar.stray_share / (near + far);
         let place = |at: usize| ((at / cols) as f64, (at % cols) as f64);

@@ -39,7 +39,7 @@ pub struct GroundTruth {
 
 /// A world that stands still, and what was seen of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Before<'a> {
+pub struct PreviousWorld<'a> {
     /// The world.
     pub world: &'a Scene,
     /// What was seen of it.
@@ -58,7 +58,7 @@ impl GroundTruth {
         scene: &Scene,
         rows: u32,
         cols: u32,
-        before: Option<Before<'_>>,
+        before: Option<PreviousWorld<'_>>,
     ) -> (Self, usize) {
         let moved = before.and_then(|before| {
             debug_assert_eq!((before.truth.rows, before.truth.cols), (rows, cols));

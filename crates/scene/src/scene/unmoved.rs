@@ -61,7 +61,7 @@ impl Moved {
 mod tests {
     use super::*;
     use crate::photon::SpadModel;
-    use crate::scene::{Before, GroundTruth, Object, Shape};
+    use crate::scene::{GroundTruth, Object, PreviousWorld, Shape};
     use crate::units::Time;
     use proptest::prelude::*;
 
@@ -134,7 +134,7 @@ mod tests {
             };
             let truth = GroundTruth::render(&before, 20, 24);
             let light = before.light_after(&truth, &spads, None);
-            let seen = Before { world: &before, truth: &truth };
+            let seen = PreviousWorld { world: &before, truth: &truth };
             let (kept, _) = GroundTruth::render_after(&now, 20, 24, Some(seen));
             let anew = GroundTruth::render(&now, 20, 24);
             prop_assert_eq!(&kept, &anew);

@@ -22,7 +22,7 @@ use crate::ranging::BinProfile;
 use crate::reproduce::measured::penalty::{ratio, sum};
 use crate::theory::Pulse;
 use crate::theory::estimators::InEdges;
-use crate::theory::partial::{Step, System};
+use crate::theory::partial::{ExposureStep, System};
 use crate::units::{Time, TimeOfFlight};
 
 /// Seeds of a step from here on are free: those before are of measurements and exposures of detections ([`steps`](super::steps)).
@@ -138,7 +138,12 @@ impl Chip<'_> {
     }
 
     /// A measurement in the window of `start`, in the light of `step`.
-    fn measuring(&self, start: u16, step: &Step, frames: usize) -> Result<Taken, EngineError> {
+    fn measuring(
+        &self,
+        start: u16,
+        step: &ExposureStep,
+        frames: usize,
+    ) -> Result<Taken, EngineError> {
         let cycles = measured_cycles(step);
         let frames = self.frames(start, step, cycles, frames)?;
         let (background_per_ns, signal) = self.levels(&frames);
@@ -171,7 +176,7 @@ impl Chip<'_> {
     fn frames(
         &self,
         start: u16,
-        step: &Step,
+        step: &ExposureStep,
         cycles: u32,
         frames: usize,
     ) -> Result<Vec<Frame>, EngineError> {

@@ -15,7 +15,7 @@ use crate::reproduce::measured::FRAMES;
 use crate::reproduce::measured::detection::judged;
 use crate::reproduce::measured::precision::{Estimator, errors_ns};
 use crate::reproduce::measured::trial::Trial;
-use crate::theory::partial::{Purpose, Step, System, largest_mean};
+use crate::theory::partial::{ExposureStep, StepPurpose, System, largest_mean};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Photons that all frames of a detection take together at 300 frames: about half a second on one core.
@@ -85,7 +85,7 @@ pub(super) fn wanted_ns(system: &System) -> f64 {
 }
 
 /// Laser cycles of the exposures by which a measurement is judged.
-pub(super) fn measured_cycles(step: &Step) -> u32 {
+pub(super) fn measured_cycles(step: &ExposureStep) -> u32 {
     step.laser_cycles.max(FEWEST_CYCLES) as u32
 }
 
@@ -98,7 +98,7 @@ fn lit(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
 }
 
 /// Seeds of a step that nothing else has.
-pub(super) fn seed(step: &Step) -> u64 {
+pub(super) fn seed(step: &ExposureStep) -> u64 {
     (1e4 * step.range_m) as u64 * 100
 }
 
@@ -106,7 +106,7 @@ pub(super) fn seed(step: &Step) -> u64 {
 pub(super) fn measuring(
     system: &System,
     sensor: &Sensor,
-    step: &Step,
+    step: &ExposureStep,
     frames: usize,
 ) -> Result<Measurement, EngineError> {
     let wanted_ns = wanted_ns(system);
@@ -124,10 +124,10 @@ pub(super) fn measuring(
 pub(super) fn detecting(
     system: &System,
     sensor: &Sensor,
-    step: &Step,
+    step: &ExposureStep,
     frames: usize,
 ) -> Result<Option<Detection>, EngineError> {
-    let Purpose::Detect { candidates, bin_m } = step.purpose else {
+    let StepPurpose::Detect { candidates, bin_m } = step.purpose else {
         return Ok(None);
     };
     let reckoned = step.laser_cycles;

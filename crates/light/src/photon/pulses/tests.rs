@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::photon::{
-    CROSSTALK_DELAY, DeadTimeLaw, EchoLaw, GROUP, Group, PulseShape, SpadGrid, SpadModel,
+    CROSSTALK_DELAY, CycleGroup, DeadTimeLaw, EchoLaw, GROUP, PulseShape, SpadGrid, SpadModel,
     StreamConfig,
 };
 use crate::units::Frequency;
@@ -292,7 +292,7 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
         let parts = stream.parts(pixel, &light);
         let pixel = &parts[0];
         pixel.draw(
-            Group::of_cycle(group * GROUP, SpadGrid::default()),
+            CycleGroup::of_cycle(group * GROUP, SpadGrid::default()),
             &stream.span(slot..slot + 1),
             &mut draw,
         );

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::exposure::PhotonStream;
-use super::group::{Group, Place};
+use super::group::{CycleGroup, GroupPlace};
 use super::part::{PixelStream, nearest};
 use super::schedule::Schedule;
 use crate::photon::light::{MOST_PER_PULSE, PixelLight, PulseTrain};
@@ -100,9 +100,9 @@ impl PixelStream<'_> {
     pub(super) fn push_foreign(
         &self,
         foreign: &Foreign,
-        group: Group,
+        group: CycleGroup,
         slots: Range<u32>,
-        kept: &mut Vec<(Place, i64)>,
+        kept: &mut Vec<(GroupPlace, i64)>,
     ) {
         let (stream, all) = (self.stream, self.stream.slots);
         if slots.is_empty() {

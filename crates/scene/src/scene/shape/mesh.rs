@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use obvhs::aabb::Aabb;
 
-use self::listed::{CrossedFace, Listed};
+use self::listed::{CrossedFace, TriangleList};
 use self::tree::{Bounds, Tree};
 use super::meeting::{Meeting, NEAREST_M};
 use super::solid;
@@ -72,18 +72,18 @@ impl PartialEq for Mesh {
 }
 
 /// Counts the lines that are read through it, to say where a file is broken.
-struct Counted<R> {
+struct LineCounter<R> {
     inner: R,
     lines: usize,
 }
 
-impl<R: Read> Read for Counted<R> {
+impl<R: Read> Read for LineCounter<R> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         self.inner.read(into)
     }
 }
 
-impl<R: BufRead> BufRead for Counted<R> {
+impl<R: BufRead> BufRead for LineCounter<R> {
     fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
         self.inner.fill_buf()
     }
@@ -119,7 +119,7 @@ impl Mesh {
             );
             return Err(complain(message));
         }
-        let mut reader = Counted {
+        let mut reader = LineCounter {
             inner: BufReader::new(file),
             lines: 0,
         };
@@ -137,7 +137,7 @@ impl Mesh {
             let message = format!("is a broken OBJ here ({e}); save it again, with its triangles");
             InputError::at_line(path.display(), lines.max(1), message)
         })?;
-        let listed = Listed::of_models(models).map_err(|CrossedFace(at)| {
+        let listed = TriangleList::of_models(models).map_err(|CrossedFace(at)| {
             let message = format!(
                 "has a face that crosses itself, with a corner at {at:?}; cut its faces into triangles"
             );
@@ -166,7 +166,7 @@ impl Mesh {
         Ok(Mesh::from_triangles(path, listed))
     }
 
-    fn from_triangles(path: &Path, listed: Listed) -> Self {
+    fn from_triangles(path: &Path, listed: TriangleList) -> Self {
         let corners = |triangle: [u32; 3]| triangle.map(|corner| listed.corners[corner as usize]);
         let used = || {
             listed

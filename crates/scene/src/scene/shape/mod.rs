@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Shapes that can be turned do their geometry in coordinates of their own ([`Pose`](pose::Pose)), worked out once for many rays
-//! ([`Placed`]).
+//! ([`PlacedShape`]).
 
 mod flat;
 mod kinds;
@@ -27,7 +27,7 @@ pub use kinds::Shape;
 pub use map::{DepthMap, MapFiles};
 pub(super) use meeting::Meeting;
 pub use mesh::Mesh;
-pub(super) use placed::Placed;
+pub(super) use placed::PlacedShape;
 
 #[cfg(test)]
 mod tests {

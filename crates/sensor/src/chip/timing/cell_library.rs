@@ -18,7 +18,7 @@ use super::library_text::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::files::instead_of;
-use crate::liberty::{Characterised, Environment, Liberty};
+use crate::liberty::{CharacterisedNetlist, Environment, Liberty};
 use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.
@@ -110,7 +110,7 @@ impl CellLibrary {
         // A kind's limits are the largest that any flip-flop of the QuantIC4x4's macropixel has.
         let mut nominal = liberty.nominal(&environment);
         let pixel = Netlist::elaborate(&macropixel::circuit(&SensorConfig::default()));
-        let placed = Characterised::new(&pixel, &liberty, &environment);
+        let placed = CharacterisedNetlist::new(&pixel, &liberty, &environment);
         let [(shortest_fs, of_shortest), (longest_fs, of_longest)] =
             placed.extreme_delays(&pixel, &liberty);
         if longest_fs > f64::from(u32::MAX) {
@@ -184,8 +184,8 @@ impl FromFile {
     }
 
     /// A netlist in its cells, each macropixel by itself.
-    pub fn characterised(&self, netlist: &Netlist) -> Characterised {
-        Characterised::with_blocks(netlist, &self.liberty, &self.environment, |module| {
+    pub fn characterised(&self, netlist: &Netlist) -> CharacterisedNetlist {
+        CharacterisedNetlist::with_blocks(netlist, &self.liberty, &self.environment, |module| {
             module.name() == macropixel::NAME
         })
     }

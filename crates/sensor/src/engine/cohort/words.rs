@@ -1,6 +1,6 @@
 //! Random words for the cohorts' draws.
 
-use crate::photon::{Purpose, philox, philox_key};
+use crate::photon::{RandomPurpose, philox, philox_key};
 
 /// Random words, made many at a time: a pure function of seed and macropixel.
 pub(super) struct RandomWords {
@@ -49,7 +49,7 @@ impl RandomWords {
 
     #[cold]
     fn refill(&mut self) {
-        let others = [0, self.pixel, Purpose::Cohort as u32];
+        let others = [0, self.pixel, RandomPurpose::Cohort as u32];
         philox::blocks_from(self.next_block, others, self.key, &mut self.words);
         self.next_block += READY as u32 / 4;
     }

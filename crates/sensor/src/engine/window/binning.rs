@@ -20,7 +20,7 @@ use multiversion::multiversion;
 use super::codes::{Code, Codes, SPAD_BITS, bin_mark, spad_mark};
 use super::echo_rows::{EchoRows, Passed};
 use super::sight::ROUNDING_FS;
-use crate::photon::{Draw, PER_BLOCK, PixelStream, Place, Slots, TIME_BITS};
+use crate::photon::{Draw, GroupPlace, PER_BLOCK, PixelStream, Slots, TIME_BITS};
 
 /// Binary places of a position in CLK periods.
 const FRACTION_BITS: u32 = 24;
@@ -154,7 +154,12 @@ impl Binning {
     }
 
     /// Appends the code of one photon, as place and time after the start of its cycle.
-    pub(super) fn push(&self, wanted: &Wanted, photon: Option<(Place, i64)>, codes: &mut Codes) {
+    pub(super) fn push(
+        &self,
+        wanted: &Wanted,
+        photon: Option<(GroupPlace, i64)>,
+        codes: &mut Codes,
+    ) {
         let (code, mark) = codes.append(1);
         (code[0], mark[0]) = match photon {
             Some((place, time_fs)) => {
@@ -271,7 +276,7 @@ impl Wanted {
 mod tests {
     use super::*;
     use crate::chip::SpadGrid;
-    use crate::photon::{GROUP, Group, PhotonStream, SpadModel, StreamConfig};
+    use crate::photon::{CycleGroup, GROUP, PhotonStream, SpadModel, StreamConfig};
     use crate::units::{Frequency, Time};
     use proptest::prelude::*;
 
@@ -320,7 +325,7 @@ mod tests {
             let row = (periods.floor() + 1.0).clamp(0.0, bins as f64 + 1.0) as usize;
             let off_edge_fs = (periods - periods.round()).abs() * period_fs;
             let wanted = Wanted { cycles, later, origin_fs, origin_slot };
-            let group = Group::of_cycle(GROUP, SpadGrid::default());
+            let group = CycleGroup::of_cycle(GROUP, SpadGrid::default());
             let mut codes = Codes::default();
             let mut in_slot = (vec![Code::NONE], vec![0]);
             encode_slots(&binning, &wanted, &[slot], (&mut in_slot.0, &mut in_slot.1));

@@ -26,8 +26,8 @@ use super::table;
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
 use crate::engine::Work;
 use crate::photon::{
-    DeadTimeLaw, Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place,
-    SpadEvent, SpadRows,
+    CycleGroup, DeadTimeLaw, Draw, GroupPlace, ListedEchoes, PER_BLOCK, Photon, PhotonStream,
+    PixelStream, SpadEvent, SpadRows,
 };
 use crate::units::Time;
 use cycle_window::CycleWindow;
@@ -96,18 +96,18 @@ struct Drawn {
     /// Photons of the group's cycles for the windows of the next cycles.
     previous: Draw,
     /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
-    carried: Vec<(Place, i64)>,
+    carried: Vec<(GroupPlace, i64)>,
 }
 
 impl Drawn {
-    fn draw(&mut self, light: &PixelStream<'_>, group: Group, spans: &Spans) -> u64 {
+    fn draw(&mut self, light: &PixelStream<'_>, group: CycleGroup, spans: &Spans) -> u64 {
         light.draw(group, &spans.own, &mut self.own);
         light.draw(group, &spans.previous, &mut self.previous);
         (self.own.len() + self.previous.len()) as u64
     }
 
     /// Keeps what the first window of the next group may see.
-    fn carry(&mut self, light: &PixelStream<'_>, group: Group) {
+    fn carry(&mut self, light: &PixelStream<'_>, group: CycleGroup) {
         self.carried.clear();
         if self.previous.is_empty() {
             return;
@@ -117,7 +117,7 @@ impl Drawn {
                 .photons(light, group.cycles())
                 .filter_map(|(place, time_fs)| {
                     let (cycle, spad) = group.split(place);
-                    (cycle + 1 == group.cycles()).then_some((Place::from(spad), time_fs))
+                    (cycle + 1 == group.cycles()).then_some((GroupPlace::from(spad), time_fs))
                 });
         self.carried.extend(photons);
     }
@@ -127,7 +127,7 @@ impl Drawn {
         &'d self,
         light: &'d PixelStream<'d>,
         stream: &'d PhotonStream,
-        group: Group,
+        group: CycleGroup,
         cycles: u32,
     ) -> impl Iterator<Item = (u32, Photon)> + 'd {
         let first = group.first_cycle();
@@ -346,7 +346,7 @@ impl<'a> Counting<'a> {
         self.codes.len
     }
 
-    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
+    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup) {
         let own = pixel.wanted[0];
         // Where all background photons of the cycles are wanted, their slots tell how many there are in each bin.
         let mut counted = 0;

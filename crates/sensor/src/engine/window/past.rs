@@ -11,7 +11,7 @@
 //! A draw has the photons of a slot in all laser cycles of a group. They are kept by cycle, for the next window of the group
 //! that asks for them.
 
-use crate::photon::{Draw, Group, Photon, PhotonStream, PixelStream, Span};
+use crate::photon::{CycleGroup, Draw, Photon, PhotonStream, PixelStream, Span};
 use crate::units::Time;
 
 /// Photons of a macropixel from some slot on, ever further back.
@@ -115,7 +115,7 @@ pub(super) struct PastDraws {
 /// Photons of one part of the light in all laser cycles of a group.
 #[derive(Debug)]
 struct PastDraw {
-    key: (usize, What, Group),
+    key: (usize, What, CycleGroup),
     /// By laser cycle.
     photons: Vec<PastPhoton>,
 }
@@ -161,7 +161,7 @@ impl PastDraws {
     }
 
     /// Draws photons, and returns where they are kept.
-    fn draw(&mut self, light: &PixelStream<'_>, key: (usize, What, Group)) -> usize {
+    fn draw(&mut self, light: &PixelStream<'_>, key: (usize, What, CycleGroup)) -> usize {
         let (_, what, group) = key;
         let span = match what {
             What::Slot(slot) => Span {

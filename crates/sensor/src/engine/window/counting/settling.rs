@@ -15,12 +15,12 @@ use smallvec::SmallVec;
 use super::{Counting, Pixel, in_draw};
 use crate::engine::window::codes::{Code, SPAD_MARKS};
 use crate::engine::window::tables::Special;
-use crate::photon::{Group, Photon};
+use crate::photon::{CycleGroup, Photon};
 use crate::units::Time;
 
 impl Counting<'_> {
     /// Settles the cycle of a special photon.
-    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, special: Special, group: Group) {
+    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, special: Special, group: CycleGroup) {
         let Special { photon, shared, .. } = special;
         let code = self.codes.codes()[photon];
         let is_settled = special.is_only

@@ -16,7 +16,7 @@ use crate::engine::window::echo_rows::Passed;
 use crate::engine::window::row_ranks::RowRanks;
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::engine::window::table::{Layout, Places, Table, WORD};
-use crate::photon::{Draw, Group, PER_BLOCK, Photon, PixelStream, Place, TIME_BITS};
+use crate::photon::{CycleGroup, Draw, GroupPlace, PER_BLOCK, Photon, PixelStream, TIME_BITS};
 use crate::units::Time;
 
 mod doubt;
@@ -54,7 +54,7 @@ thread_local! {
 /// A group of laser cycles in a table.
 struct Tabling<'t> {
     layout: &'t Layout,
-    group: Group,
+    group: CycleGroup,
     spad_bits: u32,
     /// Places of the group's laser cycles that belong to the exposure.
     end: u32,
@@ -349,7 +349,7 @@ impl Counting<'_> {
                 tabling.put_background(self, pixel, part, draw, later, kept);
                 let place = tabling.places(later);
                 let is_kept = draw.runs.is_empty() && draw.echo_photons() == [0; 2];
-                let mut list = |(own, time_fs): (Place, i64)| {
+                let mut list = |(own, time_fs): (GroupPlace, i64)| {
                     let place = u32::from(own) + place.later;
                     let (cycle, _) = tabling.split(place);
                     if place < tabling.end {

@@ -7,12 +7,12 @@ use super::{Counting, CycleWindow, Pixel};
 use crate::chip::Tdc;
 use crate::engine::window::past::Past;
 use crate::engine::window::sight::{ROUNDING_FS, Spans};
-use crate::photon::{Draw, Group, Photon, PhotonStream, PixelStream, Span};
+use crate::photon::{CycleGroup, Draw, Photon, PhotonStream, PixelStream, Span};
 use crate::units::Time;
 
 impl Counting<'_> {
     /// Counts a group cycle by cycle.
-    pub(super) fn count_whole(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
+    pub(super) fn count_whole(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup, cycles: u32) {
         let mut by_cycle = std::mem::take(&mut self.by_cycle);
         by_cycle.clear();
         by_cycle.extend(self.plain.photons(pixel.light, self.stream, group, cycles));
@@ -51,7 +51,7 @@ impl Counting<'_> {
     fn settle_cycles(
         &mut self,
         pixel: &mut Pixel<'_>,
-        group: Group,
+        group: CycleGroup,
         by_cycle: &mut Vec<(u32, Photon)>,
     ) {
         by_cycle.retain(|(_, photon)| photon.time >= Time::ZERO);
@@ -69,7 +69,7 @@ impl Counting<'_> {
         &self,
         pixel: &Pixel<'_>,
         light: &PixelStream<'_>,
-        group: Group,
+        group: CycleGroup,
         by_cycle: &mut Vec<(u32, Photon)>,
     ) {
         let config = self.stream.config();
@@ -114,7 +114,7 @@ impl Counting<'_> {
     }
 
     /// Settles the cycles in which an avalanche that breeds may matter. Their photons are in no table afterwards.
-    pub(super) fn count_breeding_cycles(&mut self, pixel: &mut Pixel<'_>, group: Group) {
+    pub(super) fn count_breeding_cycles(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup) {
         let Some(light) = pixel.breeding else {
             return;
         };
@@ -304,7 +304,7 @@ impl ByWindow {
     }
 
     /// Photons for the windows of a group.
-    pub(super) fn of_group(&self, group: Group) -> &[(u32, Photon)] {
+    pub(super) fn of_group(&self, group: CycleGroup) -> &[(u32, Photon)] {
         self.photons(group.first_cycle()..group.first_cycle().saturating_add(group.cycles()))
     }
 }
