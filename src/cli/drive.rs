@@ -12,7 +12,7 @@ use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
 use super::voice::{announce, notes, progress, say_file, say_unless_quiet};
-use crate::engine::Work;
+use crate::engine::EngineWork;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
 use crate::request::{Exposed, Spelling, check_drive_times};
@@ -86,7 +86,7 @@ struct FrameLine<'a> {
     times: FrameTimes,
     summary: Summary,
     reused: Reused,
-    work: Work,
+    work: EngineWork,
     run_times: PhaseTimes,
     /// Degrees outwards.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -115,7 +115,7 @@ struct Report<'a> {
     views_reused: u64,
     depths: u64,
     outliers: u64,
-    work: Work,
+    work: EngineWork,
     run_time_s: f64,
 }
 
@@ -199,7 +199,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         views_reused: 0,
         depths: 0,
         outliers: 0,
-        work: Work::default(),
+        work: EngineWork::default(),
         run_time_s: 0.0,
     };
     let mut recording = Recording::begin(results.staging(), &settings, args.frames)?;

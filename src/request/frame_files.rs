@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::FrameRequest;
 use crate::analysis::VerdictReport;
 use crate::chip::{Mode, SensorConfig, WindowLaw, library_files};
-use crate::engine::{Work, variance_left_out};
+use crate::engine::{EngineWork, variance_left_out};
 use crate::files::{InputError, OutputFile, file_hash, parse_json};
 use crate::report::{Cell, DepthMap, write_npy_u16};
 use crate::scene::{EyeSafety, Scene, Train};
@@ -63,7 +63,7 @@ pub struct FrameReport<'a, P = ()> {
     summary: Summary,
     remark: Option<&'a str>,
     photons_expected: f64,
-    work: Work,
+    work: EngineWork,
     timing: &'a VerdictReport,
     tolerance: Option<&'a Kept>,
     #[serde(skip_serializing_if = "Option::is_none")]

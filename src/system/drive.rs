@@ -41,7 +41,7 @@ use super::pixel::PixelDepth;
 use super::result::PhaseTimes;
 use super::stopwatch::Stopwatch;
 use super::summary::Summary;
-use crate::engine::{Answer, Histograms, Work};
+use crate::engine::{Answer, EngineWork, Histograms};
 use crate::guide::{GuideMap, PastFrame};
 use crate::scene::GroundTruth;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -73,7 +73,7 @@ pub struct DriveFrame {
     /// Light's way there and back in one bin, as a distance, m.
     pub bin_m: f64,
     /// What the engine did, without what was reused.
-    pub work: Work,
+    pub work: EngineWork,
     /// What was left out.
     pub reused: Reused,
     /// What the simulation took.

@@ -24,7 +24,7 @@ use super::stopwatch::{Stopwatch, timed};
 use super::tolerance::{Kept, Tolerance};
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::{
-    Answer, Cohort, EngineError, Exposed, LitPixel, PulsedPixel, Replay, Window, expose,
+    Answer, Cohort, EngineError, ExposureResult, LitPixel, PulsedPixel, Replay, Window, expose,
     expose_without_skipping, load,
 };
 use crate::guide::{GuideInput, GuideMap};
@@ -158,7 +158,7 @@ struct Light {
 
 /// What an engine counted, what a tolerance kept to, and how long it took.
 struct Counted {
-    exposed: Exposed,
+    exposed: ExposureResult,
     kept: Option<Kept>,
     took_s: f64,
 }

@@ -27,7 +27,7 @@ pub use summary::{Summary, Worst, summarise};
 use super::light::photon_stream;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{
-    Cohort, CohortOptions, Cycle, EngineError, Exposed, Gate, LitPixel, Window, expose,
+    Cohort, CohortOptions, Cycle, EngineError, ExposureResult, Gate, LitPixel, Window, expose,
     expose_without_skipping,
 };
 use crate::photon::{PhotonStream, PixelLight};
@@ -87,7 +87,7 @@ pub struct Point {
 
 /// A method's histograms of a wall.
 struct Run {
-    exposed: Exposed,
+    exposed: ExposureResult,
     /// Median wall-clock time for a macropixel and laser cycle.
     time_ns: f64,
 }
@@ -163,7 +163,7 @@ impl ParetoSettings {
         photon_stream(&self.sensor, &exposure, seed, &self.scene)
     }
 
-    fn run(&self, method: Method, cell: &Cell) -> Result<Exposed, EngineError> {
+    fn run(&self, method: Method, cell: &Cell) -> Result<ExposureResult, EngineError> {
         let (sensor, pixels) = (&self.sensor, &cell.pixels);
         let laser_cycles = self.cycles_of(method);
         let exposure = self.exposure(laser_cycles);

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::pixel::PixelDepth;
 use super::summary::Summary;
 use super::tolerance::Kept;
-use crate::engine::Work;
+use crate::engine::EngineWork;
 use crate::units::Time;
 
 /// Wall-clock seconds of each phase of the simulation.
@@ -60,7 +60,7 @@ pub struct Frame {
     /// Photons and dark counts that the light makes of the whole array on average.
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.
-    pub work: Work,
+    pub work: EngineWork,
     /// Engines chosen by a depth tolerance, and the bound they keep.
     pub kept: Option<Kept>,
     /// Bits of the serial load.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::chip::{Exposure, Sensor, SensorConfig};
-use crate::engine::{EngineError, Expose, Exposed, LitPixel, expose, stream_config};
+use crate::engine::{EngineError, Expose, ExposureResult, LitPixel, expose, stream_config};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use crate::units::Time;
 
@@ -133,7 +133,7 @@ impl SpeedFrame {
     ///
     /// # Errors
     /// As [`expose`].
-    pub fn expose(&self, engine: &dyn Expose) -> Result<Exposed, EngineError> {
+    pub fn expose(&self, engine: &dyn Expose) -> Result<ExposureResult, EngineError> {
         expose(engine, &self.stream, &self.pixels, |_| ())
     }
 }

@@ -19,8 +19,8 @@ use serde::Serialize;
 use super::price;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{
-    Answer, Cohort, CohortOptions, EngineError, Expose, Exposed, Histograms, LitPixel, Window,
-    Work, expose,
+    Answer, Cohort, CohortOptions, EngineError, EngineWork, Expose, ExposureResult, Histograms,
+    LitPixel, Window, expose,
 };
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{PeakOptions, interpolate};
@@ -119,7 +119,7 @@ impl Tolerance<'_> {
         stream: &PhotonStream,
         pixels: &[LitPixel],
         done: impl Fn(usize) -> A + Sync,
-    ) -> Result<(Exposed, Kept), EngineError> {
+    ) -> Result<(ExposureResult, Kept), EngineError> {
         let Tolerance {
             tolerance_m,
             sensor,
@@ -164,7 +164,7 @@ impl Tolerance<'_> {
             Err(why) => why.refusal().is_some(),
         };
         let mut histograms = Histograms::empty(pixels.len(), self.sensor.bins);
-        let mut work = Work::default();
+        let mut work = EngineWork::default();
         let mut run = |engine: &dyn Expose, takes: &dyn Fn(&Result<f64, OnWindow>) -> bool| {
             let begin = Instant::now();
             let members: Vec<usize> = (0..pixels.len()).filter(|&i| takes(&plan[i])).collect();
@@ -182,7 +182,7 @@ impl Tolerance<'_> {
         if kept.refused().next().is_some() {
             kept.refused_run_time_share = refused.as_secs_f64() / begin.elapsed().as_secs_f64();
         }
-        Ok((Exposed { histograms, work }, kept))
+        Ok((ExposureResult { histograms, work }, kept))
     }
 }
 

@@ -150,7 +150,7 @@ fn window_by_window(
         &rises(&start)[..1],
     );
     // The model, edge by edge: START is high from the first edge of the window until the next STOP.
-    let mut model = metdc_counter::Model::new(config.bins);
+    let mut model = metdc_counter::MetdcCounterModel::new(config.bins);
     let (mut as_modelled, mut edges_seen) = (0, 0);
     for edge in 0..i64::from(STOP_PERIODS) {
         model.clock(edge >= opens.first_edge);

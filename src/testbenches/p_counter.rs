@@ -355,7 +355,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
             checks.equal(what, shown(Some(start)), shown(found));
 
             // Every count is read half a period after its edge, when the ripple is over.
-            let mut model = p_counter::Model::new(&bench.config, start as u16);
+            let mut model = p_counter::PCounterModel::new(&bench.config, start as u16);
             let expected = std::iter::from_fn(|| {
                 (!model.local_stop()).then(|| {
                     model.clock();

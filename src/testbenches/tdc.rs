@@ -89,7 +89,7 @@ fn clocked() -> Tdc {
 
 fn ring() -> Tdc {
     let (netlist, timing) = made(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
-    let model = ring_oscillator::Model::from_netlist(&netlist, &timing, "");
+    let model = ring_oscillator::RingOscillatorModel::from_netlist(&netlist, &timing, "");
     Tdc {
         name: "ring oscillator",
         seed: 2,

@@ -36,12 +36,12 @@ proptest! {
             values[pin] = !values[pin];
             bench.drive(now, names[pin], values[pin]);
             let [clk, stop, resetb, enable, local_stop] = values;
-            let model = p_counter_timing::Model { after_borrow, clk, resetb, enable, local_stop };
+            let model = p_counter_timing::PCounterTimingModel { after_borrow, clk, resetb, enable, local_stop };
             if names[pin] == "CLK" && model.counter_clk() {
                 clk_to_counter_clk.push(now + timing.clk_to_counter_clk);
             }
             if names[pin] == "STOP" && stop && !model.counter_reset() {
-                pulses.push(p_counter_timing::Model::reset_pulse(&timing, now));
+                pulses.push(p_counter_timing::PCounterTimingModel::reset_pulse(&timing, now));
             }
             now += Time::from_ps(gap_ps);
             expected.push((now - Time::from_fs(1), model));
@@ -102,7 +102,7 @@ proptest! {
         }
         let timed = bench.bus("SPAD_TIMED");
         let mut run = bench.start(&[]);
-        let mut model = front_end::summation::Model::default();
+        let mut model = front_end::summation::SummationModel::default();
         let mut pulses = pulses.into_iter().peekable();
         for k in 0..63 {
             while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise(k)) {
@@ -192,7 +192,7 @@ proptest! {
         }
         let select = bench.bus("SELECTED");
         let mut run = bench.start(&[]);
-        let mut model = metdc_counter::Model::new(bins);
+        let mut model = metdc_counter::MetdcCounterModel::new(bins);
         for (k, &start) in (1..).zip(&starts) {
             model.clock(start);
             let expected = model.selected().map_or(0, |bin| 1u64 << bin);
@@ -293,7 +293,7 @@ proptest! {
         let expected: Vec<u64> = strobes
             .iter()
             .map(|&strobe| {
-                let mut model = metdc::Model::new(bins as u32);
+                let mut model = metdc::MetdcModel::new(bins as u32);
                 let shifted = |&k: &usize| rise(k as i64) + timing.clk_to_shift <= strobe;
                 (0..events.len()).take_while(shifted).for_each(|k| model.clock(events[k]));
                 model.hits()

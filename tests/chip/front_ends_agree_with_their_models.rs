@@ -91,7 +91,7 @@ proptest! {
         let timed = bench.bus("SPAD_TIMED");
         prop_assert_eq!(timed.len(), 1);
         let mut run = bench.start(&[]);
-        let mut model = front_end::Model::new(&config, &timing);
+        let mut model = front_end::FrontEndModel::new(&config, &timing);
         let mut pulses = pulses.into_iter().peekable();
         for k in 0..edges {
             while let Some((time, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise(k)) {
@@ -139,7 +139,7 @@ proptest! {
         let events: Vec<SpadEvent> = pulses.iter().map(|&(time, spad)| SpadEvent { time, spad }).collect();
         let sensor = Sensor::from(&config);
         let delays = (timing, &**sensor.local_stop_delays());
-        let by_model = macropixel::Model::new(&config, delays, &exposure).histogram(start, pulses);
+        let by_model = macropixel::MacropixelModel::new(&config, delays, &exposure).histogram(start, pulses);
         let by_gates = Gate::new(&config, &exposure).histogram(start, &events);
         prop_assert_eq!(by_gates.as_ref(), Ok(&by_model));
         let refused = Window::new(&config, &exposure).histogram(start, &events);

@@ -1,7 +1,9 @@
 //! What may go wrong between the clocks either does no harm or is reported: loading while counting, a STOP edge
 //! anywhere in the CLK period, a reset pulse too short, two pulses of a SPAD within a period.
 
-use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, Window, WindowLaw, macropixel};
+use guided_dtof::chip::{
+    Exposure, Probe, Probes, SensorConfig, WindowLaw, WindowOutcome, macropixel,
+};
 use guided_dtof::engine::{self as fast, Cancelling, Cycle, Gate, GateSimulation, Replay};
 use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks, clock};
 use guided_dtof::netlist::{CellKind, CheckKind, Corner, Library, NetId, Netlist, Timing};
@@ -110,7 +112,7 @@ impl Bench {
     fn is_right(&self, cycle: i64, start: u16) -> bool {
         let config = SensorConfig::default();
         let law = WindowLaw::new(&config, &self.exposure);
-        let Window::Open(window) = law.window(start) else {
+        let WindowOutcome::Open(window) = law.window(start) else {
             panic!("a start value within the laser cycle");
         };
         let found = self.in_cycle(cycle);
@@ -173,13 +175,13 @@ proptest! {
         let law = WindowLaw::new(&config, &exposure).window(start);
         let found = captured(&config, &exposure, start, None);
         match law {
-            Window::Open(window) => {
+            WindowOutcome::Open(window) => {
                 prop_assert_eq!(&found.violations, &[]);
                 prop_assert!(found.is_right(&exposure, window.strobe_cause));
             }
             // The law calls a race what comes within 2 fs of a limit as well.
-            Window::Race(_) => prop_assert!(!found.violations.is_empty() || found.local_stops.len() == 3),
-            Window::Never | Window::Irregular(_) => {
+            WindowOutcome::Race(_) => prop_assert!(!found.violations.is_empty() || found.local_stops.len() == 3),
+            WindowOutcome::Never | WindowOutcome::Irregular(_) => {
                 prop_assert!(false, "the laser cycle is long enough, the P-counter the default one");
             }
         }
@@ -214,7 +216,7 @@ proptest! {
         let mut found = captured(&config, &exposure, start, None);
         // One without memory raises LOCAL_STOP before the exposure, too.
         found.local_stops.retain(|&time| has_memory || time > Time::ZERO);
-        if let Window::Open(window) = law.window(start) {
+        if let WindowOutcome::Open(window) = law.window(start) {
             // As LOCAL_STOP falls in the reset pulse it may cut a pulse of COUNTER_CLK short. That counts nothing, but ends, too
             // soon for its width, up to that width after the reset.
             let timing = law.timing();

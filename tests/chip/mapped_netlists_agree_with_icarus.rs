@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   gate engine ─► what comes to the macropixel's pins ─┬─► Kernel, delays of `CharacterisedNetlist` ─┐
-//!                                                       └─► Icarus, mapped.v and mapped.sdf ───┴─► the same?
+//!                                                       └─► Icarus, mapped.v and mapped.sdf ──────────┴─► the same?
 //! ```
 //!
 //! Where several cells of the library stand for one of ours the kernel has one delay, the sum, rounded to whole femtoseconds; Icarus rounds each.

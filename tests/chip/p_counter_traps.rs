@@ -5,7 +5,7 @@ use crate::bench;
 use crate::scenario;
 
 use bench::{Bench, SETTLING};
-use guided_dtof::chip::window_law::Window as LawWindow;
+use guided_dtof::chip::window_law::WindowOutcome as LawWindow;
 use guided_dtof::chip::{
     AfterBorrow, Exposure, PCounter, Probe, Probes, SensorConfig, Tap, WindowLaw, macropixel,
     p_counter, p_counter_timing,
@@ -91,7 +91,7 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
     let (out, local_stop) = (probes.bus(Probe::CounterOut), bench.net("LOCAL_STOP"));
     let mut run = bench.start(&["LOCAL_STOP"]);
     let is_wrong = |&load: &u64| {
-        let model = p_counter::Model::new(&config, start(load) as u16);
+        let model = p_counter::PCounterModel::new(&config, start(load) as u16);
         run.number_at(load_time(load + 1) - Time::from_fs(1), out) != Some(model.counter_out())
     };
     let wrong = (0..LOADS).filter(is_wrong).count();

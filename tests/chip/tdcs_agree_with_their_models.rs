@@ -123,7 +123,7 @@ proptest! {
         intervals in intervals(),
     ) {
         let converter = Converter::new(&ring_oscillator::circuit(stages, 7), corner, seed);
-        let steps = ring_oscillator::Model::from_netlist(&converter.netlist, &converter.timing, "").steps(128);
+        let steps = ring_oscillator::RingOscillatorModel::from_netlist(&converter.netlist, &converter.timing, "").steps(128);
         let found = converter.convert("CODE", None, &intervals);
         for (&interval, found) in intervals.iter().zip(found) {
             prop_assert_eq!(found, Some(steps.code(interval) as u64), "{}", interval);

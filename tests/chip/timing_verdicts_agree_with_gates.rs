@@ -4,7 +4,7 @@
 use guided_dtof::analysis::{TimingVerdict, corner_limits, factor_range, gate_works};
 use guided_dtof::chip::race::Conflict;
 use guided_dtof::chip::{
-    AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw,
+    AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, WindowLaw, WindowOutcome,
     hslidar_delay_line,
 };
 use guided_dtof::engine::GateSimulation;
@@ -88,7 +88,7 @@ fn one_verdict_on_every_clock() {
         let config = at_mhz(mhz);
         let verdict = TimingVerdict::analyse(&config, &TYPICAL, (0, 0));
         let law = WindowLaw::new(&config, &Exposure::new(&config, 80, 3));
-        let is_race = matches!(law.window(40), Window::Race(_));
+        let is_race = matches!(law.window(40), WindowOutcome::Race(_));
         assert_eq!(verdict.is_met(), !is_race, "{mhz} MHz: {verdict}");
         let found = violations(&config);
         assert_eq!(
@@ -186,7 +186,7 @@ fn the_verdict_is_that_of_the_window_law_in_every_mode_and_with_every_p_counter(
         let exposure = Exposure::new(&config, 1 << (config.counter_bits + 1), 4);
         let start = config.largest_start() / 4;
         let window = WindowLaw::new(&config, &exposure).window(start);
-        let is_race = matches!(window, Window::Race(_));
+        let is_race = matches!(window, WindowOutcome::Race(_));
         assert_eq!(
             verdict.is_met(),
             !is_race,
@@ -254,7 +254,7 @@ fn a_verdict_fails_where_a_load_pulse_or_the_strobe_of_stop_does() {
     };
     let refused = |config: &SensorConfig, what: Conflict| {
         let law = WindowLaw::new(config, &Exposure::new(config, 512, 1));
-        matches!(law.window(40), Window::Race(race) if race.what == what)
+        matches!(law.window(40), WindowOutcome::Race(race) if race.what == what)
     };
     for (load_mhz, fails) in [(200.0, false), (1500.0, true)] {
         let config = SensorConfig {

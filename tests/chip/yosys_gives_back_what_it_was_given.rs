@@ -15,7 +15,8 @@ use bench::{Bench, SETTLING};
 use guided_dtof::chip::Exposure;
 use guided_dtof::chip::p_counter::{self, starts_high};
 use guided_dtof::chip::{
-    Overflow, OwnBlock, SensorConfig, Window, WindowLaw, correlation, histogram, metdc, readout,
+    Overflow, OwnBlock, SensorConfig, WindowLaw, WindowOutcome, correlation, histogram, metdc,
+    readout,
 };
 use guided_dtof::netlist::{Corner, Library, Module};
 use guided_dtof::settings::Document;
@@ -101,7 +102,7 @@ fn p_counters_open_the_same_windows() {
             for start in 0..=config.largest_start() {
                 assert_eq!(starts_high(&own, start), starts_high(&config, start));
                 let windows = laws.each_ref().map(|law| match law.window(start) {
-                    Window::Open(open) => Ok(open.first_edge),
+                    WindowOutcome::Open(open) => Ok(open.first_edge),
                     other => Err(other),
                 });
                 assert_eq!(windows[0].is_ok(), windows[1].is_ok(), "{config:?} {start}");

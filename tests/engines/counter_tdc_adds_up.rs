@@ -2,11 +2,11 @@
 //! where it differs from the shift register and from delay lines; and which engines leave it out, by name.
 
 use guided_dtof::analysis::TimingVerdict;
-use guided_dtof::chip::macropixel::Model;
+use guided_dtof::chip::macropixel::MacropixelModel;
 use guided_dtof::chip::race::Irregular;
 use guided_dtof::chip::{
-    AfterBorrow, Exposure, Overflow, PCounter, Sensor, SensorConfig, Silicon, Tap, Tdc,
-    Window as LawWindow, WindowLaw, hslidar,
+    AfterBorrow, Exposure, Overflow, PCounter, Sensor, SensorConfig, Silicon, Tap, Tdc, WindowLaw,
+    WindowOutcome as LawWindow, hslidar,
 };
 use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, LitPixel, NotModelled, PulsedPixel,
@@ -142,7 +142,7 @@ proptest! {
         if config.clk_skew_ps == 0.0 || number == 0 {
             let sensor = Sensor::from(&config);
             let delays = (*sensor.timing(), &**sensor.local_stop_delays());
-            let model = Model::new(&config, delays, &exposure);
+            let model = MacropixelModel::new(&config, delays, &exposure);
             let pulses = pulses.iter().map(|pulse| (pulse.time, pulse.spad));
             prop_assert_eq!(&gate[0], &model.histogram(start, pulses)[..]);
         }

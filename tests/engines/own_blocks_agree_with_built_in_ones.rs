@@ -12,7 +12,7 @@ use guided_dtof::analysis::{LocalClocks, MacropixelTiming};
 use guided_dtof::chip::own_block::Uneven;
 use guided_dtof::chip::{
     ChipTiming, Exposure, Irregular, Limits, Mode, OwnBlock, PCounter, SensorConfig, Silicon,
-    Window, WindowLaw, correlation, front_end, histogram, metdc, p_counter,
+    WindowLaw, WindowOutcome, correlation, front_end, histogram, metdc, p_counter,
 };
 use guided_dtof::engine::{self, Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Module;
@@ -37,7 +37,10 @@ fn read_back(config: &SensorConfig) -> SensorConfig {
 }
 
 /// A law and what each engine that takes it counts.
-fn counted(config: &SensorConfig, scenario: &Scenario) -> (Vec<Window>, Vec<Option<Histograms>>) {
+fn counted(
+    config: &SensorConfig,
+    scenario: &Scenario,
+) -> (Vec<WindowOutcome>, Vec<Option<Histograms>>) {
     let law = WindowLaw::new(config, &scenario.exposure);
     let windows = scenario.starts.iter().map(|&start| law.window(start));
     let engines: [Box<dyn Replay>; 3] = [
@@ -105,7 +108,7 @@ fn a_counter_that_is_not_binary_gets_its_codes_and_the_law_of_the_others() {
                 .open()
         };
         if mode == Mode::Guided {
-            assert_eq!(windows[5], Window::Never);
+            assert_eq!(windows[5], WindowOutcome::Never);
             assert_eq!(
                 opens(30).unwrap().first_edge - opens(7).unwrap().first_edge,
                 23
@@ -142,7 +145,7 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
     let exposure = Exposure::new(&config, 60, 5);
     let scenario = scenario::in_exposure(&mut StdRng::seed_from_u64(1), config, exposure);
     let (windows, counted) = counted(&scenario.config, &scenario);
-    let same = Window::Irregular(Irregular::OwnCounter(Uneven::Same(0, 1)));
+    let same = WindowOutcome::Irregular(Irregular::OwnCounter(Uneven::Same(0, 1)));
     assert_eq!(windows, vec![same; 8]);
     assert_eq!(counted[0], counted[1]);
     assert!(counted[0].is_some() && counted[2].is_none());
@@ -223,9 +226,9 @@ fn other_blocks_read_back_count_the_same_on_gates_and_cycles_and_have_no_law() {
             counted(config, &scenario).1[..2],
             "seed {seed}, {config:?}"
         );
-        let opens = windows.iter().any(|w| matches!(w, Window::Open(_)));
+        let opens = windows.iter().any(|w| matches!(w, WindowOutcome::Open(_)));
         assert!(!opens && found[2].is_none(), "{windows:?}");
-        let why = Window::Irregular(Irregular::OwnBlock(blocks[0].0));
+        let why = WindowOutcome::Irregular(Irregular::OwnBlock(blocks[0].0));
         ran[which] += windows.iter().filter(|window| **window == why).count();
         // What the table of `gdtof timing` asks for.
         let silicon = Silicon::new(&own);

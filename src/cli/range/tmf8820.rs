@@ -10,7 +10,7 @@ use super::returns::shown;
 use crate::cli::voice::{say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
-use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
+use crate::ranging::{ArrivalOptions, Calibration, ZoneEcho, arrival};
 use crate::report::Grid;
 use crate::system::median;
 
@@ -20,7 +20,7 @@ const LEAST_SIGNAL: f64 = 100.0;
 /// One zone of one capture that sees the plane.
 struct Sighting {
     capture: usize,
-    echo: Echo,
+    echo: ZoneEcho,
     true_m: Option<f64>,
     sensor_m: Option<f64>,
 }
@@ -85,7 +85,7 @@ fn sightings(captures: &[Capture]) -> (Vec<Sighting>, LeftOut) {
             };
             found.push(Sighting {
                 capture: index,
-                echo: Echo {
+                echo: ZoneEcho {
                     zone,
                     arrival_bins: pulse.position_bins - reference.position_bins,
                     signal_counts: pulse.signal_counts,
@@ -119,7 +119,7 @@ fn fitted_on(captures: &[Capture], fit: Fit) -> Vec<bool> {
 
 fn calibrate(args: &RangeArgs, zones: usize, of: &[&Sighting]) -> Result<Calibration, InputError> {
     let known = of.iter().filter_map(|s| Some((s.echo, s.true_m?)));
-    let known: Vec<(Echo, f64)> = known.collect();
+    let known: Vec<(ZoneEcho, f64)> = known.collect();
     Calibration::fit(zones, &known).map_err(|error| {
         let message = format!("{error}; calibrate on other or more captures (--fit)");
         InputError::new(args.histograms.display(), message)
@@ -235,14 +235,14 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         None => {
             // Counts left out: the sensor has had them, and says nothing of a walk that is left.
             let own = |s: &Sighting| {
-                let echo = Echo {
+                let echo = ZoneEcho {
                     zone: s.echo.zone,
                     arrival_bins: s.sensor_m?,
                     signal_counts: 0.0,
                 };
                 Some((echo, s.true_m?))
             };
-            let known: Vec<(Echo, f64)> = fitted.iter().filter_map(|s| own(s)).collect();
+            let known: Vec<(ZoneEcho, f64)> = fitted.iter().filter_map(|s| own(s)).collect();
             let line = Calibration::fit(zones, &known).ok();
             line.and_then(|line| {
                 let known = reported.iter().filter_map(|s| own(s));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::reuse::{Last, Light, Same, Spent};
 use super::settings::{DriveSettings, FrameTimes, Noise};
 use super::state::Drive;
-use crate::engine::{Answer, Histograms, LitPixel, Work, expose};
+use crate::engine::{Answer, EngineWork, Histograms, LitPixel, expose};
 use crate::guide::{GuideInput, GuideMap};
 use crate::scene::DVec3;
 use crate::system::error::FrameError;
@@ -139,7 +139,7 @@ impl Drive<'_> {
         same: &Same,
         exposed: &(impl Fn(usize) -> A + Sync),
         spent: &mut Spent,
-    ) -> Result<(Histograms, Work), FrameError> {
+    ) -> Result<(Histograms, EngineWork), FrameError> {
         let FrameSettings {
             sensor,
             exposure,

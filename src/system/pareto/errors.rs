@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::chip::WindowLaw;
-use crate::engine::{Exposed, LitPixel};
+use crate::engine::{ExposureResult, LitPixel};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::units::TimeOfFlight;
 
@@ -26,8 +26,8 @@ impl Errors {
     pub(super) fn between(
         law: &WindowLaw,
         pixels: &[LitPixel],
-        found: &Exposed,
-        exact: &Exposed,
+        found: &ExposureResult,
+        exact: &ExposureResult,
         scale: f64,
     ) -> Self {
         let (mut differences, mut counts) = (0.0, 0.0);

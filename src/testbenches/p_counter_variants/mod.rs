@@ -26,7 +26,7 @@ use self::text::{listed, numbers};
 use crate::chip::{
     AfterBorrow, CellLibrary, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc,
 };
-use crate::chip::{Irregular, Window};
+use crate::chip::{Irregular, WindowOutcome};
 use crate::engine::waveform::write_waves;
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
@@ -415,8 +415,8 @@ fn repeated_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
         checks.equal(what, expected, counted.iter().sum());
         let exposure = Exposure::new(&config, scene.stop_periods as u32, 1);
         let law = match WindowLaw::new(&config, &exposure).window(scene.start as u16) {
-            Window::Open(_) => "one window".to_owned(),
-            Window::Irregular(Irregular::LocalStopRepeats { .. }) => {
+            WindowOutcome::Open(_) => "one window".to_owned(),
+            WindowOutcome::Irregular(Irregular::LocalStopRepeats { .. }) => {
                 "LOCAL_STOP rises more than once in a laser cycle".to_owned()
             }
             other => format!("{other:?}"),

@@ -87,7 +87,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
             listed(&found),
         );
 
-        let mut model = p_counter::Model::new(&config, START);
+        let mut model = p_counter::PCounterModel::new(&config, START);
         let mut counted = |period: i64| {
             match period {
                 0 if is_reset => model.reset(),

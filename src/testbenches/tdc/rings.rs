@@ -12,7 +12,7 @@
 use std::path::Path;
 
 use super::converter::{BEGIN, BITS, SIGMA, STAGES, made};
-use crate::chip::tdc::coupling::Row;
+use crate::chip::tdc::coupling::RingRow;
 use crate::chip::tdc::ring_oscillator;
 use crate::files::InputError;
 use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
@@ -66,8 +66,11 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let falls = recorder.falling_edges(net);
         // The first fall is from rest.
         let periods: Vec<Time> = falls.windows(2).map(|ends| ends[1] - ends[0]).collect();
-        let model =
-            ring_oscillator::Model::from_netlist(&netlist, &timing, &format!("pixel_{pixel}"));
+        let model = ring_oscillator::RingOscillatorModel::from_netlist(
+            &netlist,
+            &timing,
+            &format!("pixel_{pixel}"),
+        );
         wrong += periods
             .iter()
             .filter(|&&period| period != model.period)
@@ -84,7 +87,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let square: f64 = hz.iter().map(|hz| (hz / mean - 1.0).powi(2)).sum();
         (square / (hz.len() - 1) as f64).sqrt()
     };
-    let row = |pull_hz| Row {
+    let row = |pull_hz| RingRow {
         free_hz: free_hz.clone(),
         pull_hz,
     };

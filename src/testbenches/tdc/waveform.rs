@@ -70,7 +70,8 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let codes = ["ring.CODE", "line.SEEN"];
     let nets = codes.map(|path| netlist.signal(path).expect("it was built above"));
     let models = [
-        ring_oscillator::Model::from_netlist(&netlist, &timing, "ring").steps(1 << BITS),
+        ring_oscillator::RingOscillatorModel::from_netlist(&netlist, &timing, "ring")
+            .steps(1 << BITS),
         delay_line::model(&netlist, &timing, "line"),
     ];
     let mut kernel = Kernel::new(&netlist, &timing);

@@ -106,7 +106,7 @@ impl CorrelationTiming {
     }
 }
 
-struct Taken {
+struct CorrelationRun {
     settled: Time,
     is_right: bool,
 }
@@ -117,7 +117,7 @@ fn simulate_photons(
     limits: Limits,
     period: Time,
     photons: &Photons,
-) -> Option<Taken> {
+) -> Option<CorrelationRun> {
     const FIRST: i64 = 6;
     if config.metdc_block.is_some() {
         // Which of its flip-flops holds an event, and how, is its own.
@@ -170,7 +170,7 @@ fn simulate_photons(
         .iter()
         .rfind(|(t, net, _)| *net == event && *t < launch + period);
     let captured = [FIRST, FIRST + 1].map(|edge| stage_after(&recorder, edge));
-    Some(Taken {
+    Some(CorrelationRun {
         settled: last.map_or(Time::ZERO, |c| c.0 - launch),
         is_right: is_kept && captured == [Some(false), Some(true)],
     })

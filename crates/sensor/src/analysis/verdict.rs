@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use super::{Aim, LoadTiming, LocalClocks, MacropixelTiming};
 use crate::chip::front_end::DeadTimeTooShort;
-use crate::chip::window_law::Window;
+use crate::chip::window_law::WindowOutcome;
 use crate::chip::{
     ChipTiming, Conflict, Exposure, Limits, Probe, Race, SensorConfig, Silicon, Tdc, WindowLaw,
 };
@@ -350,8 +350,8 @@ fn law_race(config: &SensorConfig) -> Option<Race> {
     let start = config.largest_start() / 4;
     let periods = 4 * config.step_periods as u32 * (u32::from(config.largest_start()) + 1);
     match WindowLaw::new(config, &Exposure::new(config, periods, 1)).window(start) {
-        Window::Race(race) => Some(race),
-        Window::Open(_) | Window::Never | Window::Irregular(_) => None,
+        WindowOutcome::Race(race) => Some(race),
+        WindowOutcome::Open(_) | WindowOutcome::Never | WindowOutcome::Irregular(_) => None,
     }
 }
 

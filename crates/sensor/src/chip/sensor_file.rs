@@ -52,7 +52,7 @@ pub enum SensorFault {
         /// What is asked for.
         threshold: u8,
         /// What is counted.
-        lines: Lines,
+        lines: CorrelationLines,
         /// The largest that there are bits for.
         most: u32,
     },
@@ -129,14 +129,14 @@ pub enum SensorFault {
 
 /// What the correlation block of a sensor counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Lines {
+pub struct CorrelationLines {
     /// Its front end.
     pub front_end: FrontEnd,
     /// Lines of SPAD_TIMED.
     pub count: usize,
 }
 
-impl fmt::Display for Lines {
+impl fmt::Display for CorrelationLines {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.front_end.joins(), self.count) {
             (true, _) => write!(f, "the one line of front_end = {:?}", self.front_end.name()),
@@ -154,7 +154,7 @@ pub struct NeverMet {
     /// THRESHOLD.
     pub threshold: u8,
     /// What is counted.
-    pub lines: Lines,
+    pub lines: CorrelationLines,
 }
 
 impl NeverMet {
@@ -342,7 +342,7 @@ impl SensorConfig {
         }
         let most = (1 << self.threshold_bits()) - 1;
         let (threshold, event_type) = (self.threshold, self.event_type);
-        let lines = Lines {
+        let lines = CorrelationLines {
             front_end: self.front_end,
             count: self.lines(),
         };

@@ -59,11 +59,11 @@ impl Cancelling {
     pub(crate) fn seen(&self, start: u16, pulses: &[SpadEvent]) -> u64 {
         let window = self.law.window(start);
         let is_seen = |edge: i64| match &window {
-            window_law::Window::Open(window) => {
+            window_law::WindowOutcome::Open(window) => {
                 self.law.bins_of_edge(window, edge).next().is_some()
             }
-            window_law::Window::Never => false,
-            window_law::Window::Irregular(_) | window_law::Window::Race(_) => true,
+            window_law::WindowOutcome::Never => false,
+            window_law::WindowOutcome::Irregular(_) | window_law::WindowOutcome::Race(_) => true,
         };
         2 * self
             .pairs(pulses)

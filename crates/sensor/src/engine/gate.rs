@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::lanes::LaneSimulation;
 use super::readout::PinSampler;
 use super::{
-    Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay, follows,
-    full_stream,
+    Engine, EngineError, Expose, ExposureResult, Histograms, LitPixel, PulsedPixel, Replay,
+    follows, full_stream,
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
@@ -355,7 +355,11 @@ impl Replay for Gate {
 }
 
 impl Expose for Gate {
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError> {
         full_stream(self, stream, pixels)
     }
 }

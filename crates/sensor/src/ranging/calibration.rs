@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 /// One zone of one capture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Echo {
+pub struct ZoneEcho {
     /// Zone, from 0.
     pub zone: usize,
     /// Arrival after the reference's arrival, bins.
@@ -62,7 +62,7 @@ impl Calibration {
     ///
     /// # Errors
     /// When a zone has too few echoes to tell its line.
-    pub fn fit(zones: usize, echoes: &[(Echo, f64)]) -> Result<Self, CalibrationError> {
+    pub fn fit(zones: usize, echoes: &[(ZoneEcho, f64)]) -> Result<Self, CalibrationError> {
         let mut covariance = 0.0;
         let mut variance = 0.0;
         let of_zone = |zone| {
@@ -114,7 +114,7 @@ impl Calibration {
     }
 
     /// Depth of an echo, m. Its zone must be one of the calibration's.
-    pub fn depth_m(&self, echo: &Echo) -> f64 {
+    pub fn depth_m(&self, echo: &ZoneEcho) -> f64 {
         let zone = &self.zones[echo.zone];
         zone.scale_m * echo.arrival_bins
             + zone.offset_m
@@ -167,8 +167,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn echo(zone: usize, arrival_bins: f64, signal_counts: f64) -> Echo {
-        Echo {
+    fn echo(zone: usize, arrival_bins: f64, signal_counts: f64) -> ZoneEcho {
+        ZoneEcho {
             zone,
             arrival_bins,
             signal_counts,
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_zone_that_saw_too_little_is_named() {
-        let echoes: Vec<(Echo, f64)> = (0..5)
+        let echoes: Vec<(ZoneEcho, f64)> = (0..5)
             .flat_map(|i| {
                 let at = f64::from(i);
                 [(echo(0, at, 1.0), 0.1 * at), (echo(1, 2.0, 1.0), 0.1 * at)]
@@ -189,7 +189,7 @@ mod tests {
         );
         assert_eq!(Calibration::fit(1, &[]), Err(CalibrationError::TooFew(0)));
         // Arrivals are noisy where the target stands still.
-        let still: Vec<(Echo, f64)> = (0..5)
+        let still: Vec<(ZoneEcho, f64)> = (0..5)
             .map(|i| (echo(0, 7.0 + 0.01 * f64::from(i), 1.0), 0.5))
             .collect();
         assert_eq!(
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn without_a_spread_of_counts_there_is_no_walk() {
-        let echoes: Vec<(Echo, f64)> = (0..5)
+        let echoes: Vec<(ZoneEcho, f64)> = (0..5)
             .map(|i| (echo(0, i as f64, 7.0), 2.0 * i as f64 + 1.0))
             .collect();
         let fitted = Calibration::fit(1, &echoes).unwrap();
@@ -231,7 +231,7 @@ mod tests {
                     .map(|z| ZoneCalibration { scale_m: scale * (1.0 + z as f64), offset_m: offset * z as f64 })
                     .collect(),
             };
-            let echoes: Vec<(Echo, f64)> = counts
+            let echoes: Vec<(ZoneEcho, f64)> = counts
                 .iter()
                 .enumerate()
                 .map(|(i, &n)| echo(i % 3, (i / 3) as f64 * 1.3, n))

@@ -98,16 +98,16 @@ impl StrobeInputs {
 
 /// Reference model: the shift register as bits of a word, the newest event in bit 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Model {
+pub struct MetdcModel {
     shift: u64,
     bins: u32,
 }
 
-impl Model {
+impl MetdcModel {
     /// An empty METDC with up to 64 stages.
     pub fn new(bins: u32) -> Self {
         debug_assert!((1..=64).contains(&bins));
-        Model { shift: 0, bins }
+        MetdcModel { shift: 0, bins }
     }
 
     /// A rising edge of CLK with this SPAD_EVENT.
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn bin_zero_is_the_earliest_period() {
-        let mut model = Model::new(16);
+        let mut model = MetdcModel::new(16);
         model.clock(true);
         for _ in 0..15 {
             model.clock(false);

@@ -29,7 +29,7 @@ pub(crate) struct Contract {
     /// What a sensor has instead where delay lines time photons, if that leaves no place for it.
     delay_lines: Option<&'static str>,
     /// What it does not do.
-    flaw: fn(&Found<'_>) -> Option<String>,
+    flaw: fn(&CheckedBlock<'_>) -> Option<String>,
     /// Whether a window law says what it counts.
     has_law: bool,
     /// Whether loops may lead through flip-flops.
@@ -108,13 +108,13 @@ pub fn replaceable() -> impl Iterator<Item = &'static str> {
 }
 
 /// A netlist in question.
-struct Found<'n> {
+struct CheckedBlock<'n> {
     netlist: &'n Netlist,
     probes: Probes,
     paths: &'n StaticTiming<'n>,
 }
 
-impl<'n> Found<'n> {
+impl<'n> CheckedBlock<'n> {
     fn after(&self, from: &[NetId], edges: &[Edge]) -> Arrivals<'n> {
         let starts = from
             .iter()
@@ -198,7 +198,7 @@ impl Contract {
             ));
         }
         let (netlist, probes) = (&netlist, Probes::of_block(&netlist));
-        match (self.flaw)(&Found {
+        match (self.flaw)(&CheckedBlock {
             netlist,
             probes,
             paths,
@@ -209,7 +209,7 @@ impl Contract {
     }
 }
 
-fn p_counter(found: &Found<'_>) -> Option<String> {
+fn p_counter(found: &CheckedBlock<'_>) -> Option<String> {
     let clk = found.probes.net(Probe::CounterClk);
     let after = found.after(&[clk], &[Edge::Rise]);
     let mut cells = found.netlist.cells().iter();
@@ -232,15 +232,15 @@ fn p_counter(found: &Found<'_>) -> Option<String> {
     None
 }
 
-fn correlation(found: &Found<'_>) -> Option<String> {
+fn correlation(found: &CheckedBlock<'_>) -> Option<String> {
     let after = found.after(found.probes.bus(Probe::SpadTimed), &Edge::BOTH);
     let changes = after.window(found.probes.net(Probe::SpadEvent)).is_some();
     let flaw = "has a SPAD_EVENT that no SPAD_TIMED changes; make it of gates behind them";
     (!changes).then(|| flaw.to_owned())
 }
 
-fn front_end(found: &Found<'_>) -> Option<String> {
-    let Found {
+fn front_end(found: &CheckedBlock<'_>) -> Option<String> {
+    let CheckedBlock {
         netlist, probes, ..
     } = found;
     let samplers: Vec<usize> = probes.samplers(netlist).collect();
@@ -276,8 +276,8 @@ const TO_HIT: [(Probe, Edge, usize, Option<Edge>); 6] = [
     (Probe::Clk, Edge::Rise, 0, None),
 ];
 
-fn metdc(found: &Found<'_>) -> Option<String> {
-    let Found {
+fn metdc(found: &CheckedBlock<'_>) -> Option<String> {
+    let CheckedBlock {
         netlist, probes, ..
     } = found;
     let cells = probes.find_hit_cells(netlist).unwrap_or_default();
@@ -311,7 +311,7 @@ fn metdc(found: &Found<'_>) -> Option<String> {
     })
 }
 
-fn histogram(found: &Found<'_>) -> Option<String> {
+fn histogram(found: &CheckedBlock<'_>) -> Option<String> {
     let netlist = found.netlist;
     let reached = reached(
         netlist,

@@ -25,13 +25,13 @@ pub use contract::replaceable;
 pub use law::{CounterLaw, Uneven};
 
 use super::config::SensorConfig;
-use super::p_counter::count_down::Expected;
+use super::p_counter::count_down::CountDownSetup;
 
 /// Laws that have been measured, by netlist and what is expected of it.
-type Laws = HashMap<(u64, Expected), Arc<CounterLaw>>;
+type Laws = HashMap<(u64, CountDownSetup), Arc<CounterLaw>>;
 
 /// What is known of the state of netlists, likewise.
-type HiddenStates = HashMap<(u64, Expected), Option<String>>;
+type HiddenStates = HashMap<(u64, CountDownSetup), Option<String>>;
 
 impl OwnBlock {
     /// The state that it must not have as the P-counter of this sensor, and the cell that holds it; looked for once a process. It must
@@ -39,7 +39,7 @@ impl OwnBlock {
     fn hidden_state(&self, config: &SensorConfig) -> Option<String> {
         static KNOWN: LazyLock<Mutex<HiddenStates>> = LazyLock::new(Mutex::default);
         let (module, hash) = (self.module()?, self.hash()?);
-        let expected = Expected::of_sensor(config);
+        let expected = CountDownSetup::of_sensor(config);
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         let state = known.entry((hash, expected));
         state
@@ -52,7 +52,7 @@ impl OwnBlock {
         static LAWS: LazyLock<Mutex<Laws>> = LazyLock::new(Mutex::default);
         let module = self.module().expect("it has been checked");
         let hash = self.hash().expect("it has been checked");
-        let expected = Expected::of_sensor(config);
+        let expected = CountDownSetup::of_sensor(config);
         let mut laws = LAWS.lock().unwrap_or_else(PoisonError::into_inner);
         let law = laws.entry((hash, expected));
         Arc::clone(law.or_insert_with(|| Arc::new(CounterLaw::measure(module, expected))))
@@ -198,7 +198,7 @@ mod tests {
             let one = m.gate(CellKind::Xnor2, &[clk, clk]);
             let stop = stop(&mut m, [one, memory_reset, clk, reset]);
             m.gate_into(CellKind::Buf, &[stop], local_stop);
-            let expected = Expected {
+            let expected = CountDownSetup {
                 has_memory: true,
                 after_borrow: AfterBorrow::Hold,
                 step_periods: 1,

@@ -38,7 +38,7 @@ pub struct FromFile {
 
 /// Everything that decides what a file becomes.
 #[derive(Clone, PartialEq, Eq, Hash)]
-struct Wanted {
+struct LibraryKey {
     path: PathBuf,
     cells: String,
     input_slew_ps: u64,
@@ -69,13 +69,13 @@ impl CellLibrary {
                 format!("corner = {corner:?} with a library in another corner; give {key}, too");
             return Err((key, message));
         }
-        let wanted = Wanted {
+        let wanted = LibraryKey {
             path: path.clone(),
             cells: config.liberty_cells.clone(),
             input_slew_ps: config.input_slew_ps.to_bits(),
             wire_ff: config.wire_ff.to_bits(),
         };
-        static READ: LazyLock<Mutex<HashMap<Wanted, &'static FromFile>>> =
+        static READ: LazyLock<Mutex<HashMap<LibraryKey, &'static FromFile>>> =
             LazyLock::new(Mutex::default);
         let mut read = READ.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = read.get(&wanted) {

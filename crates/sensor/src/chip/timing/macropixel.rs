@@ -30,15 +30,15 @@ use crate::units::Time;
 pub use counter::CounterDelays;
 
 /// Earliest and latest.
-pub type Span = (Time, Time);
+pub type DelaySpan = (Time, Time);
 
 /// The width of a span.
-pub fn spread(span: Span) -> Time {
+pub fn spread(span: DelaySpan) -> Time {
     span.1 - span.0
 }
 
 /// The span from the earlier beginning to the later end.
-pub(crate) fn hull(a: Span, b: Span) -> Span {
+pub(crate) fn hull(a: DelaySpan, b: DelaySpan) -> DelaySpan {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
@@ -307,7 +307,7 @@ impl<'c> MacropixelPaths<'c> {
     }
 
     /// TOGGLE → PHOTONS, of all SPADs and either edge.
-    fn joining(&self) -> Option<Span> {
+    fn joining(&self) -> Option<DelaySpan> {
         let probes = &self.circuit.probes;
         let photons = probes.find(Probe::Photons)?[0];
         let arrival_window = |&toggle: &NetId| {
@@ -370,7 +370,7 @@ impl<'c> MacropixelPaths<'c> {
     }
 
     /// SPAD_RAW rises → what CLK samples, of each SPAD.
-    pub(crate) fn front_end_latency(&self) -> Vec<Span> {
+    pub(crate) fn front_end_latency(&self) -> Vec<DelaySpan> {
         if self.circuit.sampled.is_empty() {
             let toggles = self.circuit.toggles.iter();
             return toggles.map(|&toggle| self.clock_to_q(toggle, 0)).collect();
@@ -425,7 +425,7 @@ impl<'c> MacropixelPaths<'c> {
     }
 
     /// Fastest and slowest arc of every cell of some kinds.
-    fn arcs(&self, is: impl Fn(CellKind) -> bool) -> impl Iterator<Item = Option<Span>> {
+    fn arcs(&self, is: impl Fn(CellKind) -> bool) -> impl Iterator<Item = Option<DelaySpan>> {
         let cells = self.circuit.netlist.cells().iter().enumerate();
         cells
             .filter(move |(_, leaf)| is(leaf.kind))
@@ -458,30 +458,30 @@ pub struct MacropixelDelays {
     /// The slowest pulse shaper, where there are any.
     pub shaper: Option<ShaperDelays>,
     /// TOGGLE → PHOTONS, where delay lines time what SPADs have in common.
-    pub joining: Option<Span>,
+    pub joining: Option<DelaySpan>,
     /// CLK rises → all that CLK samples has settled, latest, which of built-in blocks is SPAD_EVENT; nothing where delay lines time
     /// photons. A path that no values excite may be longer than any that they do: see the timing analysis of the correlation block.
     pub event: Time,
     /// CLK rises → the stage of SHIFT changes that each bin's HIT takes, bin 0 first; none where delay lines time photons.
-    pub shift: Vec<Span>,
+    pub shift: Vec<DelaySpan>,
     /// STOP rises → COUNTER_RESET rises.
-    pub reset: Span,
+    pub reset: DelaySpan,
     /// STOP rises → COUNTER_RESET falls.
-    pub release: Span,
+    pub release: DelaySpan,
     /// STOP rises → STOP_D rises, behind the delay chain.
-    pub stop_d: Span,
+    pub stop_d: DelaySpan,
     /// STOP rises → the pulse that becomes COUNTER_RESET rises, falls.
-    pub pulse: (Span, Span),
+    pub pulse: (DelaySpan, DelaySpan),
     /// STOP rises → RUN changes.
-    pub run: Span,
+    pub run: DelaySpan,
     /// STOP rises → RUN rises.
-    pub run_rise: Span,
+    pub run_rise: DelaySpan,
     /// STOP rises → STROBE rises, where STOP makes the strobe: in the conventional mode.
-    pub stop_strobe: Span,
+    pub stop_strobe: DelaySpan,
     /// STOP rises → what freezes the window rises, conventional mode: STROBE, or SAMPLE_CLK before it.
-    pub stop_sample: Span,
+    pub stop_sample: DelaySpan,
     /// STOP rises → HIT's reset ends, conventional mode.
-    pub stop_hit_release: Span,
+    pub stop_hit_release: DelaySpan,
     /// STROBE rises → HIT rises, latest.
     pub strobe_to_hit: Time,
     /// The flip-flop of a bin's lowest bit, and HIT's rise (latest) and fall (earliest) → its clock, where HIT clocks it.
@@ -540,19 +540,19 @@ impl MacropixelDelays {
     }
 }
 
-fn edge(arrivals: &Arrivals<'_>, net: NetId, edge: Edge) -> Span {
+fn edge(arrivals: &Arrivals<'_>, net: NetId, edge: Edge) -> DelaySpan {
     let window = arrivals.edge_window(net, edge);
     window.expect("the macropixel connects these")
 }
 
-fn changes(arrivals: &Arrivals<'_>, net: NetId) -> Span {
+fn changes(arrivals: &Arrivals<'_>, net: NetId) -> DelaySpan {
     arrivals.window(net).expect("the macropixel connects these")
 }
 
-fn latest(windows: impl Iterator<Item = Option<Span>>) -> Option<Time> {
+fn latest(windows: impl Iterator<Item = Option<DelaySpan>>) -> Option<Time> {
     windows.flatten().map(|window| window.1).max()
 }
 
-fn earliest(windows: impl Iterator<Item = Option<Span>>) -> Option<Time> {
+fn earliest(windows: impl Iterator<Item = Option<DelaySpan>>) -> Option<Time> {
     windows.flatten().map(|window| window.0).min()
 }

@@ -85,7 +85,7 @@ struct Back {
 
 /// How a settled laser cycle's neighbours begin.
 #[derive(Debug, Clone)]
-pub(super) enum Before {
+pub(super) enum NeighbourStart {
     /// Dark until then: every SPAD is ready.
     Dark(f64),
     /// Background for ever, and from then on all the light there is. What is forgotten by the window may have been another.
@@ -96,7 +96,7 @@ pub(super) enum Before {
 pub(super) struct Class {
     pub cycles: u64,
     pub extent: Extent,
-    pub before: Before,
+    pub before: NeighbourStart,
     pub not_compared: usize,
 }
 
@@ -233,9 +233,9 @@ impl Scene {
                     echoes: sent,
                 },
                 before: if is_settled {
-                    Before::Steady(steady_until.max(since_fs))
+                    NeighbourStart::Steady(steady_until.max(since_fs))
                 } else {
-                    Before::Dark(starts_fs)
+                    NeighbourStart::Dark(starts_fs)
                 },
                 not_compared: law.not_compared(window, cycle),
             }
@@ -247,8 +247,8 @@ impl Scene {
     pub(super) fn start(&self, blindness: &Blindness, class: &Class) -> Ages {
         let step_fs = self.period_fs;
         let (mut ages, since_fs) = match class.before {
-            Before::Dark(until_fs) => (Ages::rested(blindness), until_fs),
-            Before::Steady(until_fs) => {
+            NeighbourStart::Dark(until_fs) => (Ages::rested(blindness), until_fs),
+            NeighbourStart::Steady(until_fs) => {
                 let background = self.light.background(step_fs);
                 (Ages::steady(blindness, background), until_fs)
             }

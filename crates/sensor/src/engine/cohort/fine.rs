@@ -29,11 +29,11 @@ use smallvec::{SmallVec, smallvec};
 
 use super::FEW_STEPS;
 use super::blindness::{Ages, Blindness};
-use super::cycles::{Before, Class, Scene};
+use super::cycles::{Class, NeighbourStart, Scene};
 use super::events::EventTable;
 use super::grid::{CELLS, Grid};
 use super::hits::Hits;
-use super::secondaries::{Acts, Cell, Secondaries};
+use super::secondaries::{Acts, HazardCell, Secondaries};
 use super::spad_light::absorbed;
 use crate::engine::EngineError;
 use crate::photon::DeadTimeLaw;
@@ -206,8 +206,8 @@ fn carry(
     let memory = blindness.memory();
     let remembered_fs = memory as f64 * scene.period_fs;
     let (is_dark, since_fs) = match class.before {
-        Before::Dark(until_fs) => (true, scene.from_fs - until_fs),
-        Before::Steady(until_fs) => (false, scene.from_fs - until_fs),
+        NeighbourStart::Dark(until_fs) => (true, scene.from_fs - until_fs),
+        NeighbourStart::Steady(until_fs) => (false, scene.from_fs - until_fs),
     };
     let since_fs = match blindness.law {
         DeadTimeLaw::NonParalysable => since_fs.max(remembered_fs),
@@ -216,11 +216,11 @@ fn carry(
     };
     let grid = Grid::new(scene, class, since_fs, memory, halvings);
     let absolute: Vec<f64> = grid.edges.iter().map(|edge| scene.from_fs + edge).collect();
-    let cells: Vec<Cell> = scene
+    let cells: Vec<HazardCell> = scene
         .light
         .between(&absolute, &class.extent)
         .into_iter()
-        .map(Cell::new)
+        .map(HazardCell::new)
         .collect();
     let spad = Spad {
         grid,
@@ -243,7 +243,7 @@ fn carry(
 
 struct Spad {
     grid: Grid,
-    cells: Vec<Cell>,
+    cells: Vec<HazardCell>,
     memory: usize,
     secondaries: Secondaries,
 }

@@ -113,13 +113,13 @@ fn odds(means: &Means) -> Means {
     photons
 }
 
-/// Rows of [`Seen`] that need no memory of their own.
+/// Rows of [`HitCycles`] that need no memory of their own.
 const FEW_ROWS: usize = 5;
 
 /// Cycles in which 0, 1, 2, … SPADs are hit at least, for each of several CLK periods, down to the first row of zeros.
-struct Seen(SmallVec<[[u64; LANES]; FEW_ROWS]>);
+struct HitCycles(SmallVec<[[u64; LANES]; FEW_ROWS]>);
 
-impl Seen {
+impl HitCycles {
     /// SPADs that are hit.
     #[inline(always)]
     fn hits(&self) -> [u64; LANES] {
@@ -156,7 +156,7 @@ fn draw_hits<const MOST: usize>(
     spads: usize,
     cycles: u64,
     random: &mut RandomWords,
-) -> Seen {
+) -> HitCycles {
     let mut odds = [0.0; LANES];
     odds[..odds_of_periods.len()].copy_from_slice(odds_of_periods);
     // tₖ − 1
@@ -187,7 +187,7 @@ fn draw_hits<const MOST: usize>(
     seen.push(at_least);
     // There always is a row of two SPADs.
     seen.resize(seen.len().max(3), [0; LANES]);
-    Seen(seen)
+    HitCycles(seen)
 }
 
 /// Takes `count` of the `hits` SPADs with a pulse in the period of this lane off the cycles they fell into.

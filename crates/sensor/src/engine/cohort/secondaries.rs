@@ -24,7 +24,7 @@ pub fn variance_left_out(afterpulse_probability: f64) -> f64 {
 
 /// What a hazard in a cell does.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cell {
+pub(super) struct HazardCell {
     pub mean: f64,
     /// Probability of nothing.
     pub none: f64,
@@ -36,7 +36,7 @@ pub(super) struct Cell {
     fire: f64,
 }
 
-impl Cell {
+impl HazardCell {
     pub(super) fn new(mean: f64) -> Self {
         let any = absorbed(mean);
         // Where the quotient would lose its digits, a series.
@@ -45,7 +45,7 @@ impl Cell {
         } else {
             1.0 - any / mean
         };
-        Cell {
+        HazardCell {
             mean,
             none: 1.0 - any,
             any,
@@ -57,7 +57,7 @@ impl Cell {
     /// As many more, for a reason of its own.
     fn and(self, more: f64) -> Self {
         if more > 0.0 {
-            Cell::new(self.mean + more)
+            HazardCell::new(self.mean + more)
         } else {
             self
         }
@@ -115,7 +115,7 @@ impl Secondaries {
     /// avalanches that are no pulse of their own.
     pub(super) fn act(
         &self,
-        photons: &Cell,
+        photons: &HazardCell,
         crossing: f64,
         width_fs: f64,
         ready: &mut Traps,

@@ -34,8 +34,8 @@ use rayon::prelude::*;
 
 use super::error::{has_no_delay_lines, refuse_races};
 use super::{
-    Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
-    full_stream,
+    Engine, EngineError, Expose, ExposureResult, Gate, Histograms, LitPixel, PulsedPixel, Replay,
+    follows, full_stream,
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::window_law::WindowLaw;
@@ -277,7 +277,11 @@ impl Replay for Cycle {
 }
 
 impl Expose for Cycle {
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError> {
         full_stream(self, stream, pixels)
     }
 }

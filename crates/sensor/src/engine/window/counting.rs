@@ -16,7 +16,7 @@
 
 use smallvec::SmallVec;
 
-use super::binning::{Binning, Scratch, Wanted};
+use super::binning::{Binning, PhotonSelection, Scratch};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
 use super::past::PastDraws;
@@ -24,7 +24,7 @@ use super::pulses::Window;
 use super::sight::{ROUNDING_FS, Sight, Spans};
 use super::table;
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
-use crate::engine::Work;
+use crate::engine::EngineWork;
 use crate::photon::{
     CycleGroup, DeadTimeLaw, Draw, GroupPlace, ListedEchoes, PER_BLOCK, Photon, PhotonStream,
     PixelStream, SpadEvent, SpadRows,
@@ -52,7 +52,7 @@ pub(super) struct Counting<'a> {
     /// What a CLK period adds to its bin, by the number of SPADs that fired.
     adds: Vec<i64>,
     spacing: Spacing,
-    plain: Drawn,
+    plain: GroupDraws,
     breeding: ByWindow,
     /// Photons of parts of the light that are kept by window.
     layers: Vec<ByWindow>,
@@ -90,7 +90,7 @@ pub(super) struct Counting<'a> {
 
 /// What was drawn of a group.
 #[derive(Debug, Default)]
-struct Drawn {
+struct GroupDraws {
     /// Photons of the windows' own cycles.
     own: Draw,
     /// Photons of the group's cycles for the windows of the next cycles.
@@ -99,7 +99,7 @@ struct Drawn {
     carried: Vec<(GroupPlace, i64)>,
 }
 
-impl Drawn {
+impl GroupDraws {
     fn draw(&mut self, light: &PixelStream<'_>, group: CycleGroup, spans: &Spans) -> u64 {
         light.draw(group, &spans.own, &mut self.own);
         light.draw(group, &spans.previous, &mut self.previous);
@@ -178,10 +178,10 @@ struct Pixel<'p> {
     /// The photons that do, where there is but one layer.
     breeding: Option<&'p PixelStream<'p>>,
     /// Photons of `plain.own` and `plain.previous`.
-    wanted: [Wanted; 2],
+    wanted: [PhotonSelection; 2],
     echo: Option<EchoRows>,
     hits: Vec<i64>,
-    work: Work,
+    work: EngineWork,
     /// In bright light: how long before a window its photons are drawn from at first.
     look_back: Time,
     /// And the parts of the light that may have photons there.
@@ -205,7 +205,7 @@ impl<'a> Counting<'a> {
                 blind: dead_rows,
             },
             adds: (0..=stream.spads()).map(adds).collect(),
-            plain: Drawn::default(),
+            plain: GroupDraws::default(),
             breeding: ByWindow::default(),
             layers: Vec::new(),
             past: PastDraws::default(),
@@ -234,14 +234,18 @@ impl<'a> Counting<'a> {
     }
 
     /// Hits of every bin of a macropixel, and what they took. `parts` are those of its light ([`PhotonStream::parts`]).
-    pub(super) fn expose(&mut self, sight: &Sight, parts: &[PixelStream<'_>]) -> (Vec<i64>, Work) {
+    pub(super) fn expose(
+        &mut self,
+        sight: &Sight,
+        parts: &[PixelStream<'_>],
+    ) -> (Vec<i64>, EngineWork) {
         let light = &parts[0];
         let breeding = parts.get(BREEDING).filter(|_| light.is_alone);
         let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs];
         let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
         let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
         let has_marks = self.stream.spads() == SPADS;
-        let wanted = [0, 1].map(|later| Wanted {
+        let wanted = [0, 1].map(|later| PhotonSelection {
             cycles: 0,
             later,
             origin_fs: origins_fs[later as usize],
@@ -260,7 +264,7 @@ impl<'a> Counting<'a> {
                 .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs))
                 .flatten(),
             hits: self.engine.law.empty_hits(&sight.window),
-            work: Work::default(),
+            work: EngineWork::default(),
             look_back: Time::ZERO,
             near: SmallVec::new(),
         };
@@ -334,7 +338,7 @@ impl<'a> Counting<'a> {
                 .encode(pixel.light, draw, wanted, echo, scratch, &mut self.codes);
             self.first_code[part] = self.codes.len;
         }
-        let wanted = Wanted {
+        let wanted = PhotonSelection {
             cycles: 1,
             later: 0,
             ..pixel.wanted[1]
@@ -371,7 +375,7 @@ impl<'a> Counting<'a> {
 
     /// When a photon came, relative to the start of the laser cycle of its window.
     fn time_of(&self, light: &PixelStream<'_>, photon: usize, laser_cycle: u32) -> Time {
-        let Drawn {
+        let GroupDraws {
             own,
             previous,
             carried,

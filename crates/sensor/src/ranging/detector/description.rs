@@ -14,7 +14,7 @@ use std::f64::consts::LN_2;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Coincidence, Counted, Detector};
+use super::{Coincidence, CountedEvents, Detector};
 
 /// The longest bin over the mean one, and the mean one over the shortest: chosen. The search for peaks would see little in more unequal ones.
 const MOST_UNEQUAL: f64 = 4.0;
@@ -32,7 +32,7 @@ pub struct DetectorDescription {
     /// Full width at half maximum of the laser pulse with all jitter.
     pub pulse_fwhm_ns: Option<f64>,
     /// Which events count; every one if missing.
-    pub counts: Option<Counted>,
+    pub counts: Option<CountedEvents>,
     /// Laser cycles of a histogram.
     pub laser_cycles: Option<u32>,
     /// Counts at which a bin stops.
@@ -79,11 +79,11 @@ impl DetectorDescription {
             );
             return Err(bad("pulse_fwhm_ns", message));
         }
-        let counted = self.counts.unwrap_or(Counted::Every);
+        let counted = self.counts.unwrap_or(CountedEvents::Every);
         let coincidence = self.coincidence.map(checked).transpose()?;
         match self.laser_cycles {
             Some(0) => return Err(bad("laser_cycles", "0 is impossible; give 1 or more")),
-            None if counted == Counted::First => {
+            None if counted == CountedEvents::First => {
                 let message =
                     "is needed where only the first event of a laser cycle counts; give 1 or more";
                 return Err(bad("laser_cycles", message));
@@ -245,7 +245,7 @@ mod tests {
             ..plain()
         };
         let first = DetectorDescription {
-            counts: Some(Counted::First),
+            counts: Some(CountedEvents::First),
             ..plain()
         };
         let faults = [

@@ -210,7 +210,7 @@ fn an_echo_is_lost_where_it_is_strong_and_its_place_open() {
             background_per_bin: 0.02,
             sigma_bins: 0.74,
         };
-        finder.is_lost(&Corrected { light, bound_bins })
+        finder.is_lost(&CorrectedPeak { light, bound_bins })
     };
     // A photon for every SPAD, and a quarter of a bin.
     let found =

@@ -13,14 +13,14 @@ use std::f64::consts::TAU;
 
 /// A row of coupled rings.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct RingRow {
     /// Frequency of each ring alone, Hz.
     pub free_hz: Vec<f64>,
     /// How far a neighbour can pull a ring's frequency, Hz.
     pub pull_hz: f64,
 }
 
-impl Row {
+impl RingRow {
     /// The frequency that they share once they have locked: the mean of their own, Hz.
     pub fn locked_hz(&self) -> f64 {
         self.free_hz.iter().sum::<f64>() / self.free_hz.len() as f64
@@ -101,11 +101,11 @@ mod tests {
             vec![1.0e9, 0.97e9, 1.01e9, 1.05e9, 0.99e9],
         ] {
             let row = |share: f64| {
-                let free = Row {
+                let free = RingRow {
                     free_hz: free_hz.clone(),
                     pull_hz: 0.0,
                 };
-                Row {
+                RingRow {
                     pull_hz: share * free.least_pull_hz(),
                     ..free
                 }
@@ -123,7 +123,7 @@ mod tests {
     /// Below its lock, Adler's pair beats at √(Δf² − (2h)²).
     #[test]
     fn two_rings_beat_as_adler_has_it() {
-        let row = Row {
+        let row = RingRow {
             free_hz: vec![1.00e9, 1.02e9],
             pull_hz: 6e6,
         };

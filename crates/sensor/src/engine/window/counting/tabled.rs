@@ -11,8 +11,8 @@
 
 use std::cell::Cell;
 
-use super::{Counting, CycleWindow, Drawn, Pixel};
-use crate::engine::window::echo_rows::Passed;
+use super::{Counting, CycleWindow, GroupDraws, Pixel};
+use crate::engine::window::echo_rows::PassedEdges;
 use crate::engine::window::row_ranks::RowRanks;
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::engine::window::table::{Layout, Places, Table, WORD};
@@ -26,12 +26,12 @@ const STEPS: u32 = 1 << TIME_BITS;
 
 /// What is kept from one macropixel to the next.
 #[derive(Debug, Default)]
-pub(super) struct Tabled {
+pub(super) struct TableScratch {
     table: Table,
     /// Of each part of the light.
-    drawn: Vec<Drawn>,
+    drawn: Vec<GroupDraws>,
     echoes: Vec<Option<RowRanks>>,
-    passed: Passed,
+    passed: PassedEdges,
     unknown: Vec<u32>,
     /// Photons that are put one by one: place and time after the start of the window's cycle.
     listed: Vec<(u32, i64)>,
@@ -48,7 +48,7 @@ pub(super) struct Tabled {
 thread_local! {
     /// Those that this thread had last: tables are large, and made anew for every batch of macropixels took 9 % of the instructions
     /// of a frame of 1600 laser cycles.
-    static KEPT: Cell<Option<Box<Tabled>>> = const { Cell::new(None) };
+    static KEPT: Cell<Option<Box<TableScratch>>> = const { Cell::new(None) };
 }
 
 /// A group of laser cycles in a table.
@@ -99,7 +99,7 @@ impl Tabling<'_> {
         light: &PixelStream<'_>,
         draw: &Draw,
         later: u32,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let (slots, places) = (light.slots(), self.places(later));
         let moved_fs = i64::from(later) * counting.stream.cycle_fs;
@@ -161,7 +161,7 @@ impl Tabling<'_> {
     }
 
     #[inline]
-    fn put(&mut self, row: usize, place: u32, kept: &mut Tabled) {
+    fn put(&mut self, row: usize, place: u32, kept: &mut TableScratch) {
         kept.table.put(row, place);
         self.seen += u64::from(self.is_in_bins(row));
     }
@@ -173,7 +173,7 @@ impl Tabling<'_> {
         pixel: &Pixel<'_>,
         place: u32,
         time_fs: i64,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let row = self.layout.row_of(time_fs).unwrap_or_else(|| {
             let (cycle, _) = self.split(place);
@@ -204,14 +204,14 @@ impl Tabling<'_> {
         light: &PixelStream<'_>,
         draw: &Draw,
         rows: &RowRanks,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let places = self.places(0);
         let halves = draw.echo().into_iter().zip(draw.echo_photons());
         for (half, (words, photons)) in halves.enumerate() {
             rows.compare(words, &mut kept.passed);
             let high = &words[1][..photons];
-            let Passed { rows, possible, .. } = &kept.passed;
+            let PassedEdges { rows, possible, .. } = &kept.passed;
             let [rows, possible] = [rows, possible].map(|rows| &rows[..photons]);
             let is_twice = self.layout.fires_twice;
             kept.unknown.clear();
@@ -264,7 +264,7 @@ impl Counting<'_> {
         };
         let parts = pixel.parts;
         kept.drawn
-            .resize_with(kept.drawn.len().max(parts.len()), Drawn::default);
+            .resize_with(kept.drawn.len().max(parts.len()), GroupDraws::default);
         kept.drawn
             .iter_mut()
             .for_each(|drawn| drawn.carried.clear());
@@ -318,7 +318,12 @@ impl Counting<'_> {
     }
 
     /// Draws the photons of a group and puts them into the table.
-    fn draw_table(&mut self, pixel: &mut Pixel<'_>, tabling: &mut Tabling<'_>, kept: &mut Tabled) {
+    fn draw_table(
+        &mut self,
+        pixel: &mut Pixel<'_>,
+        tabling: &mut Tabling<'_>,
+        kept: &mut TableScratch,
+    ) {
         let (group, parts) = (tabling.group, pixel.parts);
         let cycles = tabling.end >> tabling.spad_bits;
         let places = group.cycles() << tabling.spad_bits;

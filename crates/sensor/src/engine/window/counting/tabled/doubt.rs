@@ -1,6 +1,6 @@
 //! The SPADs that a table leaves in doubt: their photons by exact times, and by history where these depend on what came before.
 
-use super::{Tabled, Tabling};
+use super::{TableScratch, Tabling};
 use crate::engine::window::counting::{Counting, CycleWindow, Pixel};
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::engine::window::table::{Places, Table, WORD};
@@ -12,8 +12,13 @@ const PLACE_SHIFT: u32 = 46;
 
 impl Tabling<'_> {
     /// Notes the photons in doubt.
-    pub(super) fn collect(&self, counting: &Counting<'_>, pixel: &Pixel<'_>, kept: &mut Tabled) {
-        let Tabled {
+    pub(super) fn collect(
+        &self,
+        counting: &Counting<'_>,
+        pixel: &Pixel<'_>,
+        kept: &mut TableScratch,
+    ) {
+        let TableScratch {
             table,
             drawn,
             echoes,
@@ -125,7 +130,7 @@ impl Counting<'_> {
         &mut self,
         pixel: &mut Pixel<'_>,
         tabling: &mut Tabling<'_>,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let mut keys = std::mem::take(&mut kept.keys);
         let first = tabling.group.first_cycle();
