@@ -20,13 +20,13 @@ use crate::failure::Failure;
 type Report = (String, String);
 
 /// What a frame's files say of it; see `gdtof.Frame.save`.
-#[pyclass(frozen, module = "gdtof._gdtof")]
-pub(crate) struct Taken {
+#[pyclass(frozen, module = "gdtof._gdtof", name = "Taken")]
+pub(crate) struct FrameRecord {
     /// Made when it is asked for: most frames are never saved.
     report: LazyLock<Report, Box<dyn FnOnce() -> Report + Send + Sync>>,
 }
 
-impl Taken {
+impl FrameRecord {
     /// Of a frame without its histograms, which have gone to Python.
     pub(crate) fn new(
         scene_name: String,
@@ -43,17 +43,17 @@ impl Taken {
             let configuration = serde_json::to_string(&report.configuration);
             (text(serde_json::to_string(&report)), text(configuration))
         };
-        Taken {
+        FrameRecord {
             report: LazyLock::new(Box::new(report)),
         }
     }
 }
 
 #[pymethods]
-impl Taken {
+impl FrameRecord {
     #[new]
     fn unpickled(report: String, configuration: String) -> Self {
-        Taken {
+        FrameRecord {
             report: LazyLock::new(Box::new(|| (report, configuration))),
         }
     }

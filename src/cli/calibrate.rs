@@ -11,7 +11,7 @@ use crate::files::{InputError, OutputFile, refuse_input};
 use crate::numerics::intervals::mean_and_sigma;
 use crate::report::Table;
 use crate::request::{self, Spelling};
-use crate::system::{Calibrated, Sweep, SweepError, calibrate};
+use crate::system::{BinCalibration, BinSweepError, Sweep, calibrate};
 use crate::units::Time;
 
 /// Arguments of `gdtof calibrate`.
@@ -84,11 +84,11 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let found = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1));
     progress.finish_and_clear();
     let found = match found {
-        Err(why @ SweepError::NoWindow { .. }) => {
+        Err(why @ BinSweepError::NoWindow { .. }) => {
             let message = format!("{why}; give a longer laser cycle, or more counter_bits");
             return Err(InputError::new("--stop-periods", message).into());
         }
-        Err(SweepError::Engine(why)) => return Err(why.into()),
+        Err(BinSweepError::Engine(why)) => return Err(why.into()),
         Ok(found) => found,
     };
     OutputFile::write_with(&args.out, |out| {
@@ -99,7 +99,7 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn table(found: &Calibrated) -> Table {
+fn table(found: &BinCalibration) -> Table {
     let profile = &found.profile;
     let mut table = Table::new("Bins found");
     for (line, name) in ["even", "odd"].into_iter().enumerate() {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::voice::{announce, notes, progress, say_unless_quiet};
 use crate::demo::disturbed::{Disturbance, Outcome};
-use crate::demo::show::{Show, Shown};
+use crate::demo::show::{Show, ShowResult};
 use crate::demo::{Demonstrator, limit, shows, sweep};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::{BehaviouralStereo, Guide, options};
@@ -211,7 +211,7 @@ fn file_names(folder: &Path) -> std::io::Result<String> {
 }
 
 /// Pictures, point clouds, and what became of the targets.
-fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<String> {
+fn write_shown(folder: &Path, show: &Show, shown: &ShowResult) -> anyhow::Result<String> {
     let name = &show.name;
     for (number, picture) in &shown.pictures {
         picture.write_png(&folder.join(format!("{name}_{number:03}.png")))?;

@@ -14,11 +14,11 @@ use super::foxglove::Foxglove;
 use super::voice::{announce, notes, progress, say_file, say_unless_quiet};
 use crate::engine::EngineWork;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
-use crate::report::{Cell, DepthMap, NpyStack, Table};
-use crate::request::{Exposed, Spelling, check_drive_times};
+use crate::report::{DepthImage, ImageCell, NpyStack, Table};
+use crate::request::{ExposureReport, Spelling, check_drive_times};
 use crate::system::{
-    Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, NoDepth, Noise, PhaseTimes, Reused,
-    Summary, WindowPolicy,
+    DriveFrame, DriveReuse, DriveSettings, DriveSimulation, FrameClock, FrameSummary, FrameTimes,
+    NoDepth, Noise, PhaseTimes, WindowPolicy,
 };
 
 /// Arguments of `gdtof drive`.
@@ -84,8 +84,8 @@ pub(super) struct DriveArgs {
 struct FrameLine<'a> {
     number: u32,
     times: FrameTimes,
-    summary: Summary,
-    reused: Reused,
+    summary: FrameSummary,
+    reused: DriveReuse,
     work: EngineWork,
     run_times: PhaseTimes,
     /// Degrees outwards.
@@ -123,7 +123,7 @@ struct Report<'a> {
 #[derive(Serialize)]
 struct Configuration<'a> {
     #[serde(flatten)]
-    exposed: Exposed<'a>,
+    exposed: ExposureReport<'a>,
     /// As they were asked for; none for the camera pair.
     guides: &'a [String],
     windows: WindowPolicy,
@@ -180,7 +180,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     };
     let results = ResultSet::begin(&args.out, "drive")?;
     let began = Instant::now();
-    let mut drive = Drive::new(&settings)?;
+    let mut drive = DriveSimulation::new(&settings)?;
     let [load_s, exposure_s, readout_s] = drive.chip_s();
     let mut report = Report {
         version: env!("CARGO_PKG_VERSION"),
@@ -403,12 +403,12 @@ impl Recording {
 
 /// The frame's depths as a picture; all frames of a drive have the scale of what its guide can see.
 fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Result<(), InputError> {
-    let cells: Vec<Cell> = frame
+    let cells: Vec<ImageCell> = frame
         .pixels
         .iter()
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
-            (Some(m), _) => Cell::Depth(m as f32),
-            (None, why) => Cell::Category(why.map_or(0, |why| why as usize)),
+            (Some(m), _) => ImageCell::Depth(m as f32),
+            (None, why) => ImageCell::Category(why.map_or(0, |why| why as usize)),
         })
         .collect();
     let stereo = &settings.frame.scene.stereo;
@@ -419,7 +419,7 @@ fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Resul
         frame.number,
         frame.times.middle_s()
     );
-    DepthMap {
+    DepthImage {
         title: &title,
         cols: settings.frame.sensor.cols,
         cells: &cells,

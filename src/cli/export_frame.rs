@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::voice::{notes, say_unless_quiet};
 use crate::files::{InputError, ResultSet, read_counts};
 use crate::report::{Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
-use crate::system::{NoDepth, PixelDepth, RETURNS, Return, TakenFrame, cloud};
+use crate::system::{DepthReturn, NoDepth, PixelDepth, RETURNS, TakenFrame, cloud};
 
 /// Arguments of `gdtof export frame`.
 #[derive(Args)]
@@ -130,7 +130,7 @@ fn whole(pixels: &[PixelDepth], histograms: &[u16], [rows, cols, bins]: [usize; 
     for (name, number) in [
         (
             "returns_m",
-            (|r| Some(r.depth_m)) as fn(&Return) -> Option<f64>,
+            (|r| Some(r.depth_m)) as fn(&DepthReturn) -> Option<f64>,
         ),
         ("returns_bound_m", |r| r.bound_m),
         ("returns_photons", |r| Some(r.photons)),

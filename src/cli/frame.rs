@@ -19,7 +19,7 @@ use crate::files::{InputError, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
 use crate::request::{FrameReport, FrameRequest};
-use crate::system::{Probe, WindowPolicy, take_frame_by};
+use crate::system::{GateProbe, WindowPolicy, take_frame_by};
 use crate::waves::WaveFormat;
 
 /// Arguments of `gdtof frame`.
@@ -95,7 +95,7 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
         note(warning);
     }
     let results = ResultSet::begin(&args.out, "frame")?;
-    let probe_at = |(row, col)| Probe {
+    let probe_at = |(row, col)| GateProbe {
         row,
         col,
         waves: results.staging().join(wave_name(args, (row, col))),

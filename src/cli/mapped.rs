@@ -25,14 +25,14 @@ pub(super) struct SdcArgs {
 }
 
 /// A macropixel, sized and timed.
-struct Mapped<'c> {
+struct MappedMacropixel<'c> {
     config: &'c SensorConfig,
     cells: &'static FromFile,
     netlist: Netlist,
     characterised: CharacterisedNetlist,
 }
 
-impl<'c> Mapped<'c> {
+impl<'c> MappedMacropixel<'c> {
     /// # Errors
     /// A sensor of the built-in cells.
     fn new(config: &'c SensorConfig, option: &str) -> Result<Self, InputError> {
@@ -48,7 +48,7 @@ impl<'c> Mapped<'c> {
         for sentence in &cells.liberty.map.notes {
             note(sentence);
         }
-        Ok(Mapped {
+        Ok(MappedMacropixel {
             config,
             cells,
             netlist,
@@ -77,7 +77,7 @@ impl<'c> Mapped<'c> {
 /// Bad input and unwritable output.
 pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
-    Mapped::new(&config, "export sdc")?.write_sdc(&args.out)?;
+    MappedMacropixel::new(&config, "export sdc")?.write_sdc(&args.out)?;
     say_unless_quiet(format_args!("{}\n", args.out.display()))?;
     Ok(())
 }
@@ -87,8 +87,8 @@ pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
 /// # Errors
 /// A sensor of the built-in cells, and unwritable output.
 pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> {
-    let mapped = Mapped::new(config, "--mapped")?;
-    let Mapped {
+    let mapped = MappedMacropixel::new(config, "--mapped")?;
+    let MappedMacropixel {
         cells,
         netlist,
         characterised,

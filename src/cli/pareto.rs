@@ -12,7 +12,9 @@ use crate::engine::EngineError;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Axis, Chart, Grid, aligned, width};
 use crate::request::{self, Spelling};
-use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
+use crate::system::pareto::{
+    Done, GATE_CYCLES, Method, MethodSummary, ParetoPoint, ParetoSettings, summarise,
+};
 
 /// Arguments of `gdtof pareto`.
 #[derive(Args)]
@@ -61,8 +63,8 @@ struct Report<'a> {
     laser_cycles: u32,
     stop_periods: u32,
     macropixels: usize,
-    methods: &'a [Summary],
-    cells: &'a [Point],
+    methods: &'a [MethodSummary],
+    cells: &'a [ParetoPoint],
 }
 
 /// Runs the command.
@@ -185,7 +187,7 @@ fn settings(args: &ParetoArgs) -> Result<ParetoSettings, InputError> {
     })
 }
 
-fn write_cells(path: &Path, points: &[Point]) -> Result<(), InputError> {
+fn write_cells(path: &Path, points: &[ParetoPoint]) -> Result<(), InputError> {
     OutputFile::write_with(path, |out| {
         let mut cells = Grid::headed(
             "method | against_cycle | range_m | illuminance_klux | run_time_ns | speed_up \
@@ -214,7 +216,7 @@ fn write_cells(path: &Path, points: &[Point]) -> Result<(), InputError> {
 /// Depth errors below this are drawn here: equal results have no place on a logarithmic axis.
 const FLOOR_M: f64 = 1e-4;
 
-fn chart(settings: &ParetoSettings, summaries: &[Summary]) -> Chart {
+fn chart(settings: &ParetoSettings, summaries: &[MethodSummary]) -> Chart {
     let title = format!(
         "Run time against error, {} laser cycles; errors of 0 are drawn at {FLOOR_M:e} m",
         settings.laser_cycles
@@ -299,7 +301,7 @@ impl Rows {
         aligned(&HEADINGS.map(str::to_owned), &self.widths)
     }
 
-    fn row(&self, summary: &Summary) -> String {
+    fn row(&self, summary: &MethodSummary) -> String {
         let worst = &summary.worst;
         let pair = |median: f64, worst: f64, decimals: usize| {
             format!("{median:.decimals$} / {worst:.decimals$}")

@@ -2,10 +2,10 @@
 
 use crate::ranging::DepthOptions;
 use crate::report::Table;
-use crate::system::Summary;
+use crate::system::FrameSummary;
 
 /// How good the depths are, and why macropixels have none.
-pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary) {
+pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &FrameSummary) {
     let metres = |value: Option<f64>| match value {
         Some(m) => format!("{m:.3} m"),
         None => "-".to_owned(),

@@ -169,7 +169,7 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
 }
 
 /// Histograms of the array, and what else a replay finds.
-struct Replayed {
+struct ReplayResult {
     histograms: Histograms,
     cancelled: u64,
     coverage: Option<ClosedFormCoverage>,
@@ -217,7 +217,7 @@ fn replay_array(
     stimuli: &Stimuli,
     args: &ReplayArgs,
     silicon: Option<Silicon>,
-) -> anyhow::Result<Replayed> {
+) -> anyhow::Result<ReplayResult> {
     let sensor = match silicon {
         Some(silicon) => &stimuli.sensor.made_of(&silicon),
         None => &stimuli.sensor,
@@ -269,7 +269,7 @@ fn replay_array(
         }
         None => cancelled(&Gate::new(sensor, exposure), sensor, &pixels),
     };
-    Ok(Replayed {
+    Ok(ReplayResult {
         histograms: simulation.histograms()?,
         cancelled,
         coverage: None,
@@ -349,7 +349,7 @@ fn replay(
     stimuli: &Stimuli,
     kind: EngineKind,
     silicon: Option<&Silicon>,
-) -> anyhow::Result<Replayed> {
+) -> anyhow::Result<ReplayResult> {
     let Stimuli {
         sensor, exposure, ..
     } = stimuli;
@@ -364,13 +364,13 @@ fn replay(
     };
     let timed = Timed::new(sensor.made_of(silicon), exposure, runner);
     let replayed = run_engine(stimuli, &timed)?;
-    Ok(Replayed {
+    Ok(ReplayResult {
         coverage: (runner != Runner::Gate).then(|| timed.coverage()),
         ..replayed
     })
 }
 
-fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<Replayed> {
+fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<ReplayResult> {
     let template = "replaying {bar:40} {pos}/{len} macropixels";
     let progress = progress(stimuli.starts.len() as u64, template);
     let pulses = stimuli.pulses();
@@ -384,7 +384,7 @@ fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<Replayed
         })
         .collect();
     progress.finish_and_clear();
-    Ok(Replayed {
+    Ok(ReplayResult {
         histograms: Histograms::joined(engine.bins(), batches?),
         cancelled: cancelled(engine, &stimuli.sensor, &pixels),
         coverage: None,

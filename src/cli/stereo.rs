@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::voice::{notes, say_json, say_unless_quiet};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
-use crate::report::{Cell, DepthMap, Table, write_npy_f32};
+use crate::report::{DepthImage, ImageCell, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
 
 /// Arguments of `gdtof stereo`.
@@ -334,12 +334,12 @@ pub(super) fn disparity_picture(
     map: &DisparityMap,
     path: &Path,
 ) -> Result<(), InputError> {
-    let cells: Vec<Cell> = (map.values_px().iter())
+    let cells: Vec<ImageCell> = (map.values_px().iter())
         .map(|&d| {
             if d.is_nan() {
-                Cell::Category(0)
+                ImageCell::Category(0)
             } else {
-                Cell::Depth(d)
+                ImageCell::Depth(d)
             }
         })
         .collect();
@@ -347,7 +347,7 @@ pub(super) fn disparity_picture(
     let least = known().fold(f32::INFINITY, f32::min).floor();
     let most = known().fold(f32::NEG_INFINITY, f32::max).ceil();
     let first = matcher.min_disparity as f32;
-    let picture = DepthMap {
+    let picture = DepthImage {
         title: "Disparity",
         cols: map.width(),
         cells: &cells,

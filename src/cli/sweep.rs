@@ -10,8 +10,8 @@ use super::voice::{counted, note, notes, progress, say_unless_quiet};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
-    Cell, Drawing, Kind, Outcome, Plot, Results, Shard, Study, SweepError, columns, run as take,
-    study_of,
+    Drawing, Outcome, Plot, Results, Shard, Study, StudyKind, SweepError, TableCell, columns,
+    run as take, study_of,
 };
 
 /// Arguments of `gdtof sweep`.
@@ -213,7 +213,7 @@ fn write(
     let missing = results.write(set.staging(), |cells| {
         match cells.last() {
             // The last column says why there is no result.
-            Some(Cell::Word(why)) => drop(fault.get_or_insert_with(|| why.clone())),
+            Some(TableCell::Word(why)) => drop(fault.get_or_insert_with(|| why.clone())),
             _ => has_result = true,
         }
         drawings
@@ -266,8 +266,8 @@ fn outcome_table(study: &Study, outcome: &Outcome, seconds: f64) -> Table {
     if outcome.taken > 0 {
         table.push("run time", format!("{seconds:.1} s"));
         let each = match study.kind {
-            Kind::Frame => format!("{:.1} /s", outcome.taken as f64 / seconds),
-            Kind::Theory => format!("{:.0} /s", outcome.taken as f64 / seconds),
+            StudyKind::Frame => format!("{:.1} /s", outcome.taken as f64 / seconds),
+            StudyKind::Theory => format!("{:.0} /s", outcome.taken as f64 / seconds),
         };
         table.push("points taken", each);
     }

@@ -14,14 +14,16 @@
 use rayon::prelude::*;
 
 use super::Demonstrator;
-use super::found::Found;
+use super::found::TargetSummary;
 use crate::chip::{Exposure, Sensor, SensorConfig, Tdc, WindowLaw, hslidar};
 use crate::engine::{Histograms, LitPixel, Window, expose};
 use crate::guide::GuideMap;
 use crate::photon::PixelLight;
 use crate::ranging::DepthOptions;
 use crate::scene::{GroundTruth, Scene};
-use crate::system::{FrameError, Known, PixelDepth, Pointing, Ranger, WindowPolicy, photon_stream};
+use crate::system::{
+    FrameError, PixelContext, PixelDepth, Pointing, Ranger, WindowPolicy, photon_stream,
+};
 use crate::units::{Time, TimeOfFlight};
 
 /// How far full, sliding and zooming histograms look, m: the demonstrator's 75 m and a little.
@@ -39,7 +41,7 @@ pub(crate) struct Outcome {
     /// Exposures between which windows change.
     pub(crate) exposures: usize,
     /// What became of the target.
-    pub(crate) found: Found,
+    pub(crate) found: TargetSummary,
 }
 
 /// A still world before the chip, and the macropixels that matter.
@@ -103,7 +105,7 @@ pub(crate) fn compare(
         scheme,
         bins,
         exposures,
-        found: Found::summarise(depths.iter(), 0.39),
+        found: TargetSummary::summarise(depths.iter(), 0.39),
     };
     // Windows overlap: a full histogram has the bins of one step of each, and the rest of the last.
     let step_bins = 12.5 / 2.6;
@@ -194,7 +196,7 @@ impl Bench<'_> {
         let lit = self.lit(&start_of, sensor.largest_start());
         let histograms = self.expose(sensor, &exposure, salt, &lit)?;
         let depth = |(n, &pixel): (usize, &usize)| {
-            let known = Known {
+            let known = PixelContext {
                 pixel,
                 start: start_of(pixel),
                 true_m: self.truth.range_m[pixel],

@@ -1,13 +1,15 @@
 //! A scene shown as in Fig. 99 to 102: a drive through it, what became of its targets in every frame, and some frames as pictures.
 
 use super::Demonstrator;
-use super::found::Found;
+use super::found::TargetSummary;
 use super::panel::Panel;
 use super::schemes::{self, Outcome};
 use crate::report::CloudPoint;
 use crate::report::picture::Picture;
 use crate::scene::{GroundTruth, Scene};
-use crate::system::{Drive, DriveFrame, DriveSettings, FrameError, FrameTimes, PhaseTimes, cloud};
+use crate::system::{
+    DriveFrame, DriveSettings, DriveSimulation, FrameError, FrameTimes, PhaseTimes, cloud,
+};
 
 /// Something that is to be found: all objects whose name begins so.
 #[derive(Debug, Clone)]
@@ -30,9 +32,9 @@ impl Target {
     }
 
     /// What became of it in a frame.
-    pub(crate) fn found(&self, frame: &DriveFrame) -> Found {
+    pub(crate) fn found(&self, frame: &DriveFrame) -> TargetSummary {
         let pixels = self.pixels(&frame.truth).map(|pixel| &frame.pixels[pixel]);
-        Found::summarise(pixels, frame.bin_m)
+        TargetSummary::summarise(pixels, frame.bin_m)
     }
 
     /// The macropixels that see it.
@@ -80,14 +82,14 @@ pub(crate) struct ShownFrame {
     /// When what happened.
     pub(crate) times: FrameTimes,
     /// Each target.
-    pub(crate) targets: Vec<Found>,
+    pub(crate) targets: Vec<TargetSummary>,
     /// What the simulation took.
     pub(crate) run_times: PhaseTimes,
 }
 
 /// A show that has been run.
 #[derive(Debug, Clone)]
-pub(crate) struct Shown {
+pub(crate) struct ShowResult {
     /// Its frames.
     pub(crate) frames: Vec<ShownFrame>,
     /// Frames as pictures, with their numbers.
@@ -114,9 +116,9 @@ impl Show {
         &self,
         demonstrator: &Demonstrator,
         done: impl Fn(),
-    ) -> Result<Shown, FrameError> {
-        let mut drive = Drive::new(&self.settings)?;
-        let mut shown = Shown {
+    ) -> Result<ShowResult, FrameError> {
+        let mut drive = DriveSimulation::new(&self.settings)?;
+        let mut shown = ShowResult {
             frames: Vec::new(),
             pictures: Vec::new(),
             clouds: Vec::new(),

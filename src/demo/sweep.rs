@@ -5,7 +5,7 @@ use super::found::mean;
 use super::scenes::figure_at;
 use crate::report::{Axis, Chart};
 use crate::scene::GroundTruth;
-use crate::system::{Drive, FrameError, FrameSettings, PixelDepth};
+use crate::system::{DriveSimulation, FrameError, FrameSettings, PixelDepth};
 
 /// Illuminance, klux.
 pub(crate) const KLUX: f64 = 72.0;
@@ -92,7 +92,7 @@ pub(crate) fn point_with(
     let square = square_on(&truth);
     settings.only = Some(square.clone());
     change(&mut settings.frame);
-    let mut drive = Drive::new(&settings)?;
+    let mut drive = DriveSimulation::new(&settings)?;
     let mut pixels: Vec<PixelDepth> = Vec::new();
     for _ in 0..FRAMES {
         let frame = drive.frame(|_| {})?;

@@ -29,7 +29,7 @@ use crate::chip::SensorConfig;
 use crate::files::InputError;
 use crate::guide::view;
 use crate::scene::{DVec3, Ray, Scene, Stage};
-use crate::system::{NoDepth, RETURNS, Ranger, Return, TakenSettings};
+use crate::system::{DepthReturn, NoDepth, RETURNS, Ranger, TakenSettings};
 use crate::units::TimeOfFlight;
 
 /// Pixels of the camera view across a macropixel.
@@ -204,7 +204,7 @@ fn arrays(
     floats(&|p| Some(found[p].1?.signal_counts));
     floats(&|p| Some(found[p].1?.background_per_bin));
     for of in [
-        (|found| Some(found.depth_m)) as fn(&Return) -> Option<f64>,
+        (|found| Some(found.depth_m)) as fn(&DepthReturn) -> Option<f64>,
         |found| found.bound_m,
         |found| Some(found.photons),
     ] {

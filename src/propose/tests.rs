@@ -61,7 +61,7 @@ fn the_front_keeps_its_promises() {
     let problem = problem(NEAR);
     let found = search(&problem, &small(), 3, |_| ()).unwrap();
     assert!(found.front.len() > 1);
-    for Confirmed { point, check } in &found.front {
+    for ConfirmedDesign { point, check } in &found.front {
         let design = &point.design;
         let config = problem.config_of(design);
         config.check().unwrap();

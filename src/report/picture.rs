@@ -1,6 +1,6 @@
 //! Pictures in true colour, composed of panels: rectangles, lines, dots and text in Noto Sans Mono.
 //!
-//! What lies outside the picture is cut off. A [`DepthMap`](super::DepthMap) alone is an indexed picture of its own kind.
+//! What lies outside the picture is cut off. A [`DepthImage`](super::DepthImage) alone is an indexed picture of its own kind.
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Claims 2 to 6: what the thesis says of the chip, measured on its netlist.
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::thesis::{chart, claim};
 use crate::analysis::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::chip::readout::{self as readout_blocks, ReadoutOrder};
@@ -90,7 +90,7 @@ impl Edges {
 }
 
 /// Claim 2: the ripple, and the CLK period it allows.
-pub(super) fn ripple_rows() -> Vec<Row> {
+pub(super) fn ripple_rows() -> Vec<ClaimRow> {
     let claim = claim(2);
     let config = SensorConfig::default();
     let timing = MacropixelTiming::analyse(&config, &NOMINAL, Limits::Ignored, (0, 0));
@@ -139,7 +139,7 @@ pub(super) fn figure_56() -> Chart {
 }
 
 /// Claim 3: Fig. 54.
-pub(super) fn fig_54_rows() -> Vec<Row> {
+pub(super) fn fig_54_rows() -> Vec<ClaimRow> {
     let claim = claim(3);
     let edges = Edges::simulate(5);
     let after_stop = edges
@@ -154,7 +154,7 @@ pub(super) fn fig_54_rows() -> Vec<Row> {
 }
 
 /// Claim 4: Fig. 48.
-pub(super) fn fig_48_rows() -> Vec<Row> {
+pub(super) fn fig_48_rows() -> Vec<ClaimRow> {
     let claim = claim(4);
     let period = SensorConfig::default().clock().period();
     let [first, second] = [52, 49].map(|start| {
@@ -200,7 +200,7 @@ fn fig_48_bins() -> Histograms {
 }
 
 /// Claim 5: the serial load, and the readout that it must not outlast.
-pub(super) fn load_rows() -> Vec<Row> {
+pub(super) fn load_rows() -> Vec<ClaimRow> {
     let claim = claim(5);
     let config = SensorConfig::default();
     let netlists = PinNetlists::new(&config);
@@ -253,13 +253,13 @@ fn counter_of(bits: usize) -> SensorConfig {
 }
 
 /// Claim 6: transistors.
-pub(super) fn area_rows() -> Vec<Row> {
+pub(super) fn area_rows() -> Vec<ClaimRow> {
     let claim = claim(6);
     let flip_flop = f64::from(CellKind::Dffr.transistors());
     let stage = PCounter::Ripple.stage_transistors() as f64;
     let stages = PCounter::ALL.map(|p_counter| {
         let what = format!("transistors of {}", p_counter.row().stage);
-        let found = Row::ours(what, "", p_counter.stage_transistors() as f64);
+        let found = ClaimRow::ours(what, "", p_counter.stage_transistors() as f64);
         match p_counter {
             PCounter::SetReset => found.remark("Fig. 51b, the HSLIDAR's."),
             _ => found,

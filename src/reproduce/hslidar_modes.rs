@@ -5,7 +5,7 @@
 //!   start values n and n + 1 ────► gates ─► LOCAL_STOP ─► the time between them           s
 //! ```
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::delay_line;
 use super::thesis::{claim, grid};
 use crate::chip::{Exposure, Probe, Sensor, SensorConfig, WindowLaw, hslidar, hslidar_delay_line};
@@ -102,7 +102,7 @@ impl Modes {
 }
 
 /// Claim 29: Table 10.
-pub(super) fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<ClaimRow> {
     let claim = claim(29);
     let Modes { clocked, lines } = Modes::measure();
     let over = |time: Time, unit: Time| time.as_s() / unit.as_s();

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::parameters;
 use super::thesis::{chart, claim};
 use crate::photon::solar::{FULL_SUN_KLUX, band_irradiance};
@@ -25,7 +25,7 @@ fn table_6(convention: Convention) -> PhotonBudget {
 const REFLECTIVITY: f64 = 0.1;
 
 /// Claim 7: signal photons.
-pub(super) fn signal_rows() -> Vec<Row> {
+pub(super) fn signal_rows() -> Vec<ClaimRow> {
     let claim = claim(7);
     let thesis = table_6(Convention::Thesis);
     let at_200 = thesis.signal_per_pulse_far_field(200.0, REFLECTIVITY);
@@ -40,7 +40,7 @@ pub(super) fn signal_rows() -> Vec<Row> {
 }
 
 /// Claim 8: sunlight.
-pub(super) fn background_rows() -> Vec<Row> {
+pub(super) fn background_rows() -> Vec<ClaimRow> {
     let claim = claim(8);
     let filter = Filter::new(905.0, 20.0, FilterShape::TopHat);
     let irradiance = band_irradiance(&filter);
@@ -54,7 +54,7 @@ pub(super) fn background_rows() -> Vec<Row> {
 }
 
 /// Claim 21: the demonstrator's measured light.
-pub(super) fn demonstrator_rows() -> Vec<Row> {
+pub(super) fn demonstrator_rows() -> Vec<ClaimRow> {
     let claim = claim(21);
     let scaled = parameters::demonstrator_light(100.0) / 1e6;
     vec![
@@ -110,7 +110,7 @@ fn formula(bins: u32, cycles: u64, model: DetectionModel) -> f64 {
 }
 
 /// Claim 9: P_D against Monte Carlo.
-pub(super) fn detection_rows() -> Vec<Row> {
+pub(super) fn detection_rows() -> Vec<ClaimRow> {
     let claim = claim(9);
     let points: Vec<(u32, u64)> = FIG_32_BINS
         .into_iter()

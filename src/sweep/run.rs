@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::SweepError;
 use super::row::{Index, journals_in};
-use super::study::{Kind, Study};
+use super::study::{Study, StudyKind};
 use super::subject::{Scratch, Subject};
 use crate::engine::Answer;
 use crate::files::{
@@ -59,7 +59,7 @@ pub struct Outcome {
 
 /// The study that a folder holds results of.
 #[derive(Debug, Serialize, Deserialize)]
-struct Kept {
+struct StoredStudy {
     name: String,
     source: String,
     folder: PathBuf,
@@ -90,7 +90,7 @@ pub fn run<A: Answer>(
     let path = folder.join(shard.journal());
     refuse_input(&path)?;
     set_aside_foreign(&folder.join(STUDY), |file| {
-        serde_json::from_reader::<_, Kept>(file).is_ok()
+        serde_json::from_reader::<_, StoredStudy>(file).is_ok()
     })?;
     set_aside_foreign(&path, is_journal)?;
     let Some(journal) = Journal::open(&path)? else {
@@ -104,10 +104,10 @@ pub fn run<A: Answer>(
     let workers = (rayon::current_num_threads() as u64).min(points).max(1);
     // A theoretical point takes less than a write.
     let batch = match study.kind {
-        Kind::Frame => 1,
-        Kind::Theory => 256,
+        StudyKind::Frame => 1,
+        StudyKind::Theory => 256,
     };
-    let work = Work {
+    let work = SharedSweep {
         subject: Subject::new(study),
         study,
         shard,
@@ -120,7 +120,7 @@ pub fn run<A: Answer>(
         failed: AtomicBool::new(false),
         error: Mutex::new(None),
     };
-    if points < 2 * workers && study.kind == Kind::Frame {
+    if points < 2 * workers && study.kind == StudyKind::Frame {
         // Too few to go round: all threads on one frame after the other.
         work.go(&done);
     } else {
@@ -154,7 +154,7 @@ pub fn run<A: Answer>(
 }
 
 /// What all threads share.
-struct Work<'a> {
+struct SharedSweep<'a> {
     subject: Subject<'a>,
     study: &'a Study,
     shard: Shard,
@@ -169,7 +169,7 @@ struct Work<'a> {
     error: Mutex<Option<SweepError>>,
 }
 
-impl Work<'_> {
+impl SharedSweep<'_> {
     /// Takes points until there are no more.
     fn go<A: Answer>(&self, done: &(impl Fn(u64) -> A + Sync)) {
         let mut scratch = Scratch::default();
@@ -237,7 +237,7 @@ impl Work<'_> {
 /// Writes down which study a folder is of.
 fn keep(study: &Study, folder: &Path) -> Result<(), InputError> {
     let here = std::path::absolute(study.folder()).unwrap_or_else(|_| study.folder().to_owned());
-    let kept = Kept {
+    let kept = StoredStudy {
         name: study.name.clone(),
         source: study.source().to_owned(),
         folder: here,
@@ -260,7 +260,7 @@ pub fn study_of(folder: &Path) -> Result<Study, InputError> {
         return Err(InputError::new(folder.display(), message));
     }
     let text = read_text(&path)?;
-    let kept: Kept = parse_json(
+    let kept: StoredStudy = parse_json(
         path.display(),
         &text,
         "a folder that `gdtof sweep` has written",

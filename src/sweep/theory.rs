@@ -4,7 +4,7 @@
 //! pulse, a Gaussian error of the guide, a window centred on its estimate as nearly as start values allow. The pulse fills bins as it falls
 //! on them ([`SpreadEcho`]); the Gaussian models put the share of its fullest bin into one.
 
-use super::cell::{Cell, Column, Holds};
+use super::cell::{Column, Holds, TableCell};
 use crate::chip::{SensorConfig, Tdc};
 use crate::photon::PhotonBudget;
 use crate::scene::Scene;
@@ -35,7 +35,7 @@ words! {
 
 keys! {
     /// Settings of theory.
-    pub(super) struct Asked {
+    pub(super) struct TheorySettings {
         /// Range of the wall; 50 if left out.
         range_m: f64 ["m"] = 50.0, in Above(0.0, 1e5);
         /// Its reflectivity; 0.3 if left out.
@@ -109,7 +109,7 @@ impl Rig {
 
 /// What has just been computed.
 #[derive(Debug, Default)]
-pub(super) struct Last {
+pub(super) struct TheoryCache {
     /// Of a wall without its guide.
     detection: Option<(Wall, Detection, Option<f64>)>,
     /// Of a wall in one laser cycle; precision goes with the root of their number.
@@ -129,7 +129,7 @@ pub(super) struct Wall {
 }
 
 impl Wall {
-    pub(super) fn new(mut rig: Rig, asked: &Asked) -> Self {
+    pub(super) fn new(mut rig: Rig, asked: &TheorySettings) -> Self {
         rig.illuminance_klux = asked.illuminance_klux.unwrap_or(rig.illuminance_klux);
         Wall {
             rig,
@@ -144,7 +144,7 @@ impl Wall {
 
     /// The results. `last` makes those of a wall that differs from the one before in the guide alone, or in laser cycles, cheap: the bound
     /// takes an integral, detection and the search for laser cycles a sum.
-    pub(super) fn results(&self, last: &mut Last) -> Vec<Cell> {
+    pub(super) fn results(&self, last: &mut TheoryCache) -> Vec<TableCell> {
         let Wall { rig, .. } = self;
         let (bin_s, cycles) = (rig.bin_s, self.laser_cycles as f64);
         let background_hz = (rig.budget).background_hz(self.reflectivity, rig.illuminance_klux);
@@ -210,7 +210,7 @@ impl Wall {
             Some(in_window),
             Some(in_window * detection.probability),
         ]
-        .map(Cell::maybe)
+        .map(TableCell::maybe)
         .into()
     }
 
@@ -266,26 +266,29 @@ mod tests {
             Wall::new(rig, &toml::from_str(asked).unwrap())
         };
         let usual = wall("");
-        for key in Asked::KEYS {
+        for key in TheorySettings::KEYS {
             let asked = match key.name {
                 "model" => "model = \"poisson\"".to_owned(),
                 name => format!("{name} = 0.9").replace("laser_cycles = 0.9", "laser_cycles = 9"),
             };
             assert_ne!(wall(&asked), usual, "{} changes nothing", key.name);
         }
-        assert_eq!(usual.results(&mut Last::default()).len(), columns().len());
+        assert_eq!(
+            usual.results(&mut TheoryCache::default()).len(),
+            columns().len()
+        );
     }
 
     #[test]
     fn results_are_those_of_the_formulas() {
         let (sensor, scene) = (SensorConfig::default(), Scene::outdoor());
-        let asked = Asked {
+        let asked = TheorySettings {
             range_m: 120.0,
             goal_detection: Some(0.99),
-            ..Asked::default()
+            ..TheorySettings::default()
         };
         let wall = Wall::new(Rig::new(&sensor, &scene), &asked);
-        let results = wall.results(&mut Last::default());
+        let results = wall.results(&mut TheoryCache::default());
         let number = |name: &str| {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             results[at].number().unwrap()
@@ -311,7 +314,12 @@ mod tests {
             .iter()
             .position(|c| c.name == "p_detection")
             .unwrap();
-        assert!(longer.results(&mut Last::default())[at].number().unwrap() >= 0.99);
+        assert!(
+            longer.results(&mut TheoryCache::default())[at]
+                .number()
+                .unwrap()
+                >= 0.99
+        );
     }
 
     /// 200 MHz and steps of four periods; elements of 2.6 ns and steps of 12.5 ns (thesis Tables 11 and 14); both of 7 bits.
@@ -320,8 +328,8 @@ mod tests {
         let scene = Scene::outdoor();
         for (sensor, bin_ns, step_ns) in [(hslidar(), 5.0, 20.0), (hslidar_delay_line(), 2.6, 12.5)]
         {
-            let results = Wall::new(Rig::new(&sensor, &scene), &Asked::default())
-                .results(&mut Last::default());
+            let results = Wall::new(Rig::new(&sensor, &scene), &TheorySettings::default())
+                .results(&mut TheoryCache::default());
             let number = |name: &str| {
                 let at = columns().iter().position(|c| c.name == name).unwrap();
                 results[at].number().unwrap()
@@ -335,21 +343,24 @@ mod tests {
 
     #[test]
     fn what_was_computed_before_changes_nothing() {
-        let mut last = Last::default();
+        let mut last = TheoryCache::default();
         let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
         for range_m in [20.0, 150.0] {
             for laser_cycles in [100, 1000] {
                 for model in [Counts::Bernoulli, Counts::Gaussian] {
                     for guide_sigma_m in [0.5, 2.0] {
-                        let asked = Asked {
+                        let asked = TheorySettings {
                             range_m,
                             laser_cycles,
                             model,
                             guide_sigma_m,
-                            ..Asked::default()
+                            ..TheorySettings::default()
                         };
                         let wall = Wall::new(rig, &asked);
-                        assert_eq!(wall.results(&mut last), wall.results(&mut Last::default()));
+                        assert_eq!(
+                            wall.results(&mut last),
+                            wall.results(&mut TheoryCache::default())
+                        );
                     }
                 }
             }
@@ -358,14 +369,14 @@ mod tests {
 
     #[test]
     fn a_black_wall_has_no_precision_and_is_found_by_chance() {
-        let asked = Asked {
+        let asked = TheorySettings {
             reflectivity: 0.0,
-            ..Asked::default()
+            ..TheorySettings::default()
         };
         let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
         let wall = Wall::new(rig, &asked);
-        let results = wall.results(&mut Last::default());
-        assert_eq!(results[4], Cell::Empty);
+        let results = wall.results(&mut TheoryCache::default());
+        assert_eq!(results[4], TableCell::Empty);
         // The echo's bin and its neighbour.
         assert!((results[2].number().unwrap() - 2.0 / 16.0).abs() < 1e-9);
     }
@@ -376,16 +387,16 @@ mod tests {
         let number = |fwhm_ns: f64, range_m: f64, name: &str| {
             let mut scene = Scene::outdoor();
             scene.lidar.pulse_fwhm_ns = fwhm_ns;
-            let asked = Asked {
+            let asked = TheorySettings {
                 range_m,
                 reflectivity: 0.1,
                 illuminance_klux: Some(100.0),
                 laser_cycles: 200,
-                ..Asked::default()
+                ..TheorySettings::default()
             };
             let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
             let at = columns().iter().position(|c| c.name == name).unwrap();
-            wall.results(&mut Last::default())[at].number()
+            wall.results(&mut TheoryCache::default())[at].number()
         };
         let [short, usual, long] =
             [1.0, 2.0, 4.5].map(|fwhm_ns| number(fwhm_ns, 200.0, "p_detection"));
@@ -421,15 +432,15 @@ mod tests {
         scene.lidar.pulse_fwhm_ns = 1.0;
         scene.lidar.spad_jitter_fwhm_ps = 3000.0;
         scene.lidar.trigger_jitter_ps = 1500.0;
-        let asked = Asked {
+        let asked = TheorySettings {
             range_m: 150.0,
             reflectivity: 0.1,
             illuminance_klux: Some(50.0),
             laser_cycles: 15,
-            ..Asked::default()
+            ..TheorySettings::default()
         };
         let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
-        let results = wall.results(&mut Last::default());
+        let results = wall.results(&mut TheoryCache::default());
         let number = |name: &str| {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             results[at].number().unwrap()

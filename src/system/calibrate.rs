@@ -8,7 +8,7 @@
 //!
 //! Every step is an exposure of its own on the window engine, with photons of its own. One even and one odd window are swept: others
 //! differ from them by whole steps of CLK. [`Sweep::every_window`] sweeps all and takes the mean of what each finds, which is
-//! also the proof of that: [`Calibrated::largest_difference`] is of the order of a step.
+//! also the proof of that: [`BinCalibration::largest_difference`] is of the order of a step.
 
 use rayon::prelude::*;
 
@@ -38,7 +38,7 @@ pub struct Sweep {
 
 /// What a sweep has found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Calibrated {
+pub struct BinCalibration {
     /// The bins of every macropixel: means over its even and over its odd windows that were swept.
     pub profile: BinProfile,
     /// Even and odd windows of a macropixel that were swept.
@@ -75,7 +75,7 @@ pub fn calibrate(
     stop_periods: u32,
     sweep: &Sweep,
     swept: impl Fn() + Sync,
-) -> Result<Calibrated, SweepError> {
+) -> Result<BinCalibration, BinSweepError> {
     assert_eq!(
         sensor.tdc,
         Tdc::DelayLine,
@@ -90,7 +90,7 @@ pub fn calibrate(
     });
     for (starts, is_odd) in starts.iter().zip([false, true]) {
         if starts.is_empty() {
-            return Err(SweepError::NoWindow { is_odd });
+            return Err(BinSweepError::NoWindow { is_odd });
         }
     }
     let sweeping = Sweeping {
@@ -99,9 +99,9 @@ pub fn calibrate(
         exposure: &exposure,
     };
     // What is looked for is how far the windows of one line differ by anything but whole steps.
-    let line = |pixel: usize, starts: &[u16]| -> Result<(LineProfile, f64), SweepError> {
+    let line = |pixel: usize, starts: &[u16]| -> Result<(LineProfile, f64), BinSweepError> {
         let law = law.of_macropixel(pixel as u32);
-        let lines: Result<Vec<LineProfile>, SweepError> = (0..)
+        let lines: Result<Vec<LineProfile>, BinSweepError> = (0..)
             .zip(starts)
             .map(|(nth, &start)| {
                 let mut line = sweeping.line(&law, pixel, start, nth)?;
@@ -115,7 +115,7 @@ pub fn calibrate(
             .collect();
         Ok(mean(&lines?))
     };
-    let macropixels: Result<Vec<_>, SweepError> = (0..sensor.pixels())
+    let macropixels: Result<Vec<_>, BinSweepError> = (0..sensor.pixels())
         .into_par_iter()
         .map(|pixel| {
             let lines = [line(pixel, &starts[0])?, line(pixel, &starts[1])?];
@@ -131,7 +131,7 @@ pub fn calibrate(
         })
     });
     let macropixels = macropixels.collect();
-    Ok(Calibrated {
+    Ok(BinCalibration {
         profile: BinProfile {
             sensor: (**sensor).clone(),
             starts: [starts[0][0], starts[1][0]],
@@ -157,7 +157,7 @@ impl Sweeping<'_> {
         pixel: usize,
         start: u16,
         nth: u64,
-    ) -> Result<LineProfile, SweepError> {
+    ) -> Result<LineProfile, BinSweepError> {
         let Sweeping {
             sensor,
             sweep,
@@ -219,7 +219,7 @@ fn mean(lines: &[LineProfile]) -> (LineProfile, f64) {
 
 /// Why bins cannot be swept.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SweepError {
+pub enum BinSweepError {
     /// The window engine refuses.
     #[error(transparent)]
     Engine(#[from] EngineError),

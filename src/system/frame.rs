@@ -15,13 +15,13 @@ use super::error::FrameError;
 use super::light::{light_in, lit, photon_stream, starts_of, truth_in};
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
-use super::ranger::{Known, Ranger};
+use super::ranger::{PixelContext, Ranger};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
-use super::settings::{EngineKind, FrameSettings, Probe};
-use super::shared::{Look, SharedWork};
+use super::settings::{EngineKind, FrameSettings, GateProbe};
+use super::shared::{SharedView, SharedWork};
 use super::stopwatch::{Stopwatch, timed};
-use super::tolerance::{Kept, Tolerance};
+use super::tolerance::{Tolerance, ToleranceResult};
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::{
     Answer, Cohort, EngineError, ExposureResult, LitPixel, PulsedPixel, Replay, Window, expose,
@@ -45,7 +45,7 @@ mod tests;
 /// A guide without a map, and what [`take_guided_frame`] reports.
 pub fn take_frame<A: Answer>(
     settings: &FrameSettings,
-    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     take_frame_by(settings, WindowPolicy::default(), probes, exposed)
@@ -58,7 +58,7 @@ pub fn take_frame<A: Answer>(
 pub fn take_frame_by<A: Answer>(
     settings: &FrameSettings,
     policy: WindowPolicy,
-    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let FrameSettings {
@@ -124,7 +124,7 @@ pub fn take_guided_frame<A: Answer>(
     settings: &FrameSettings,
     guide: &GuideMap,
     wanted: &[Option<u16>],
-    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let sensor = &settings.sensor;
@@ -145,7 +145,7 @@ struct Plan<'a> {
     guide: &'a GuideMap,
     wanted: &'a [Option<u16>],
     /// What frames share, and what of it those with this look do.
-    shared: Option<(&'a SharedWork, &'a Arc<Look>)>,
+    shared: Option<(&'a SharedWork, &'a Arc<SharedView>)>,
 }
 
 /// What is there, and what of it falls on the array.
@@ -157,14 +157,14 @@ struct Light {
 }
 
 /// What an engine counted, what a tolerance kept to, and how long it took.
-struct Counted {
+struct FrameCounts {
     exposed: ExposureResult,
-    kept: Option<Kept>,
+    kept: Option<ToleranceResult>,
     took_s: f64,
 }
 
 /// What the counts say, and how long it took to tell.
-struct Ranged {
+struct FrameDepths {
     depths: Vec<PixelDepth>,
     bin_s: f64,
     remark: Option<String>,
@@ -185,7 +185,7 @@ impl Light {
 impl Plan<'_> {
     fn expose<A: Answer>(
         &self,
-        probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+        probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
         exposed: impl Fn(usize) -> A + Sync,
     ) -> Result<Frame, FrameError> {
         let (sensor, exposure) = (&self.settings.sensor, &self.settings.exposure);
@@ -279,7 +279,7 @@ impl Plan<'_> {
         &self,
         light: &Light,
         done: &(impl Fn(usize) -> A + Sync),
-    ) -> Result<Counted, FrameError> {
+    ) -> Result<FrameCounts, FrameError> {
         let FrameSettings {
             sensor,
             exposure,
@@ -322,21 +322,21 @@ impl Plan<'_> {
                 expose_without_skipping(&*engine, stream, pixels, done)?
             }
         };
-        Ok(Counted {
+        Ok(FrameCounts {
             exposed,
             kept,
             took_s: clock.lap(),
         })
     }
 
-    fn range(&self, light: &Light, counted: &Counted) -> Result<Ranged, FrameError> {
+    fn range(&self, light: &Light, counted: &FrameCounts) -> Result<FrameDepths, FrameError> {
         let s = self.settings;
         let mut clock = Stopwatch::new();
         let calibration = s.calibration.as_ref();
         let ranger = Ranger::new(&s.sensor, &s.exposure, &s.scene, &s.depth, calibration)?;
         let counts = counted.exposed.histograms.counts();
         let depths = ranger.of_array(counts, |pixel, counts| {
-            let known = Known {
+            let known = PixelContext {
                 pixel,
                 start: self.wanted[pixel],
                 true_m: light.truth.range_m[pixel],
@@ -353,7 +353,7 @@ impl Plan<'_> {
             light: &light.each,
             pixels: &depths,
         };
-        Ok(Ranged {
+        Ok(FrameDepths {
             remark: circumstances.remark(),
             hints: circumstances.hints(),
             bin_s: ranger.bin_s(),
@@ -365,7 +365,7 @@ impl Plan<'_> {
     fn probe<A: Answer>(
         &self,
         light: &Light,
-        probes: &[Probe],
+        probes: &[GateProbe],
         done: &(impl Fn(usize) -> A + Sync),
     ) -> Result<Vec<AtGates>, FrameError> {
         let s = self.settings;
@@ -381,7 +381,7 @@ impl Plan<'_> {
     ///
     /// # Errors
     /// The first disagreement.
-    fn compare_probes(&self, counted: &Counted, probed: &[AtGates]) -> Result<(), FrameError> {
+    fn compare_probes(&self, counted: &FrameCounts, probed: &[AtGates]) -> Result<(), FrameError> {
         let s = self.settings;
         let has_tolerance = counted.kept.is_some();
         let engine = s.engine.of_probes(has_tolerance);

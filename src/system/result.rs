@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::pixel::PixelDepth;
-use super::summary::Summary;
-use super::tolerance::Kept;
+use super::summary::FrameSummary;
+use super::tolerance::ToleranceResult;
 use crate::engine::EngineWork;
 use crate::units::Time;
 
@@ -62,7 +62,7 @@ pub struct Frame {
     /// What the engine did, and did not have to do.
     pub work: EngineWork,
     /// Engines chosen by a depth tolerance, and the bound they keep.
-    pub kept: Option<Kept>,
+    pub kept: Option<ToleranceResult>,
     /// Bits of the serial load.
     pub load_bits: usize,
     /// Time the chip needs for the load.
@@ -82,7 +82,7 @@ pub struct Frame {
 
 impl Frame {
     /// The frame in a few numbers.
-    pub fn summary(&self) -> Summary {
-        Summary::new(&self.pixels, self.bin_m)
+    pub fn summary(&self) -> FrameSummary {
+        FrameSummary::new(&self.pixels, self.bin_m)
     }
 }

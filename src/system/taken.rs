@@ -66,7 +66,7 @@ struct Version {
 
 /// What `frame.json` and `drive.json` have in common.
 #[derive(Deserialize)]
-struct Asked {
+struct RecordedRequest {
     scene_name: String,
     scene: toml::Table,
     sensor: toml::Table,
@@ -82,7 +82,7 @@ struct Asked {
 #[derive(Deserialize)]
 struct File<T> {
     #[serde(flatten)]
-    asked: Asked,
+    asked: RecordedRequest,
     #[serde(flatten)]
     rest: T,
 }
@@ -125,7 +125,7 @@ impl TakenSettings {
     }
 }
 
-impl Asked {
+impl RecordedRequest {
     fn settings(self, path: &Path) -> Result<TakenSettings, InputError> {
         let source = path.display();
         let sensor = Document::from_table(format!("{source}, sensor"), self.sensor);

@@ -72,7 +72,7 @@ impl OnWindow {
 
 /// What was chosen, and the bound that it keeps.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Kept {
+pub struct ToleranceResult {
     /// What was asked for, m.
     pub tolerance_m: f64,
     /// Largest bound of all macropixels, m.
@@ -87,7 +87,7 @@ pub struct Kept {
     pub refused_run_time_share: f64,
 }
 
-impl Kept {
+impl ToleranceResult {
     /// Macropixels that the cohort engine refused, by the reason in words.
     pub(crate) fn refused(&self) -> impl Iterator<Item = (&'static str, usize)> {
         let reasons = self.on_window_by_reason.iter();
@@ -119,7 +119,7 @@ impl Tolerance<'_> {
         stream: &PhotonStream,
         pixels: &[LitPixel],
         done: impl Fn(usize) -> A + Sync,
-    ) -> Result<(ExposureResult, Kept), EngineError> {
+    ) -> Result<(ExposureResult, ToleranceResult), EngineError> {
         let Tolerance {
             tolerance_m,
             sensor,
@@ -149,11 +149,11 @@ impl Tolerance<'_> {
             .map(|pixel| planner.choose(pixel, tolerance_m))
             .collect();
 
-        let mut kept = Kept {
+        let mut kept = ToleranceResult {
             tolerance_m,
             bound_m: plan.iter().flatten().copied().fold(0.0, f64::max),
             on_cohort: plan.iter().flatten().count(),
-            ..Kept::default()
+            ..ToleranceResult::default()
         };
         kept.on_window = pixels.len() - kept.on_cohort;
         for &why in plan.iter().filter_map(|choice| choice.as_ref().err()) {

@@ -73,7 +73,7 @@ pub fn chips() -> Vec<SensorConfig> {
 }
 
 /// A macropixel in a library's cells, and a folder with cells.lib, mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc.
-pub struct Mapped {
+pub struct MappedChip {
     pub folder: tempfile::TempDir,
     pub config: SensorConfig,
     pub cells: &'static FromFile,
@@ -81,7 +81,7 @@ pub struct Mapped {
     pub characterised: CharacterisedNetlist,
 }
 
-impl Mapped {
+impl MappedChip {
     pub fn new(text: &str, chip: SensorConfig) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let liberty = folder.path().join("cells.lib");
@@ -121,7 +121,7 @@ impl Mapped {
         for (name, file) in names.into_iter().zip(files) {
             std::fs::write(folder.path().join(name), file).unwrap();
         }
-        Mapped {
+        MappedChip {
             folder,
             config,
             cells: of_library,

@@ -15,7 +15,7 @@
 
 use crate::every_edge::waves::Waves;
 use crate::icarus;
-use crate::library_chips::{self, Mapped};
+use crate::library_chips::{self, MappedChip};
 use crate::testbench::testbench;
 
 use std::collections::BTreeMap;
@@ -45,7 +45,7 @@ const APART_FS: u64 = 20;
 type Edges = Vec<(u64, String)>;
 
 /// Compares every edge from the first STOP on; how many there are, and pulses and edges that are off.
-fn compare(mapped: &Mapped, seed: u64) -> (usize, usize) {
+fn compare(mapped: &MappedChip, seed: u64) -> (usize, usize) {
     let random = &mut StdRng::seed_from_u64(seed);
     let config = &mapped.config;
     let exposure = Exposure::new(config, 70, 3);
@@ -185,7 +185,7 @@ fn edge_by_edge() {
             .filter(|chip| !chip.reset_to_load);
         for (seed, chip) in (0..).zip(chips) {
             let p_counter = chip.p_counter;
-            let mapped = Mapped::new(&text, chip);
+            let mapped = MappedChip::new(&text, chip);
             let verdict =
                 TimingVerdict::analyse(&mapped.config, &Silicon::new(&mapped.config), (0, 0));
             if verdict.worst().slack < Time::from_ps(-50) {

@@ -23,7 +23,7 @@
 //! counters are clocked by data. Negative limits of D count as zero on both sides. OpenSTA takes one delay an arc, as we do (`analysis_type single`). Libraries:
 //! example.lib, osu018 and osu035.
 
-use crate::library_chips::{self, Mapped, PERIOD_NS};
+use crate::library_chips::{self, MappedChip, PERIOD_NS};
 use crate::tool;
 
 use std::collections::BTreeMap;
@@ -207,7 +207,7 @@ fn theirs(report: &str, own_pins: &BTreeMap<String, String>) -> Checks {
 }
 
 /// Our own, by static timing with each flip-flop's own limits.
-fn ours(mapped: &Mapped) -> Checks {
+fn ours(mapped: &MappedChip) -> Checks {
     let netlist = &mapped.netlist;
     let timing = &mapped.characterised.timing;
     let nets = |names: &[&str]| -> Vec<NetId> {
@@ -320,7 +320,7 @@ fn ours(mapped: &Mapped) -> Checks {
 }
 
 /// Our flip-flop behind every input pin of its library cell.
-fn own_pins(mapped: &Mapped) -> BTreeMap<String, String> {
+fn own_pins(mapped: &MappedChip) -> BTreeMap<String, String> {
     let mut pins = BTreeMap::new();
     for (cell, leaf) in mapped.netlist.cells().iter().enumerate() {
         if leaf.kind.is_flip_flop() {
@@ -348,7 +348,7 @@ fn of_every_endpoint_of_a_macropixel() {
         // Of each check, and whether no divided clock takes part: agree; ours asks more; OpenSTA asks more.
         let mut counted: BTreeMap<(&str, bool), [usize; 3]> = BTreeMap::new();
         for chip in library_chips::chips() {
-            let mapped = Mapped::new(&text, chip);
+            let mapped = MappedChip::new(&text, chip);
             let p_counter = mapped.config.p_counter;
             let report = mapped.opensta(COMMANDS);
             assert!(!report.contains("Error"), "{name}: {report}");

@@ -21,7 +21,7 @@ use guided_dtof::netlist::NetId;
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{VcdWriter, WaveSelection};
-use icarus::Seen;
+use icarus::IcarusChanges;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use scenario::Scenario;
@@ -305,7 +305,7 @@ fn icarus_reads_the_same_through_the_exported_pins() {
         let folder = tempfile::tempdir().unwrap();
         export_verilog(folder.path(), config, Some(&plan), None).unwrap();
         icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
-        let seen = Seen::by_testbench(folder.path());
+        let seen = IcarusChanges::by_testbench(folder.path());
         let pins = fs::read_to_string(folder.path().join("readout.csv")).unwrap();
         let counters = fs::read_to_string(folder.path().join("histograms.csv")).unwrap();
         assert_eq!(pins, counters, "{config:?}");

@@ -21,7 +21,7 @@ use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::verilog::{write_cells, write_standard_cells};
-use icarus::Seen;
+use icarus::IcarusChanges;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
 
@@ -35,7 +35,7 @@ fn files(folder: &Path) -> Vec<String> {
 }
 
 /// Compares an array whose library delays come from the file that `export sdf` writes; gives what both have seen.
-fn compare(scenario: &Scenario) -> Seen {
+fn compare(scenario: &Scenario) -> IcarusChanges {
     let Scenario {
         config,
         exposure,
@@ -64,8 +64,12 @@ fn compare(scenario: &Scenario) -> Seen {
     let said = icarus::simulate(here, &icarus::standard_cells(config.corner), &["-sdf-warn"]);
     assert_eq!(said, "", "every entry finds its path");
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (rows, cols), starts, &pulses);
-    let ours = Seen::by_kernel(&mut gate, cols);
-    assert_eq!(Seen::by_testbench(here), ours, "{starts:?} {config:?}");
+    let ours = IcarusChanges::by_kernel(&mut gate, cols);
+    assert_eq!(
+        IcarusChanges::by_testbench(here),
+        ours,
+        "{starts:?} {config:?}"
+    );
     ours
 }
 

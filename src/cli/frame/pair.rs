@@ -47,7 +47,7 @@ pub(super) struct PairArgs {
 }
 
 /// The pair in place of a scene.
-pub(super) struct Taken {
+pub(super) struct MatchedPairScene {
     pub(super) scene: Scene,
     pub(super) guide: Arc<dyn Guide>,
     pub(super) report: PairReport,
@@ -85,7 +85,7 @@ impl PairArgs {
         sensor: &SensorConfig,
         optics: Scene,
         out: &Path,
-    ) -> Result<Option<Taken>, InputError> {
+    ) -> Result<Option<MatchedPairScene>, InputError> {
         let (Some(left_path), Some(right_path), Some(calib_path)) =
             (&self.left, &self.right, &self.calib)
         else {
@@ -183,7 +183,7 @@ impl PairArgs {
             matched: map.matched(),
             disparity_errors: truth.map(|truth| Errors::new(&map, &truth)),
         };
-        Ok(Some(Taken {
+        Ok(Some(MatchedPairScene {
             scene,
             guide: Arc::new(guide),
             report,
@@ -194,7 +194,7 @@ impl PairArgs {
     }
 }
 
-impl Taken {
+impl MatchedPairScene {
     /// Writes depths that light comes from, and disparities that guide.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use crate::files::MANIFEST;
 use crate::report::Table;
 use crate::request::{eye_safety_of, frame_s, variance_left_out_of};
 use crate::scene::EyeSafety;
-use crate::system::{Frame, FrameSettings, NoDepth, Summary};
+use crate::system::{Frame, FrameSettings, FrameSummary, NoDepth};
 use crate::units::Time;
 
 /// What matters first.
@@ -65,7 +65,7 @@ pub(super) fn brief(
 }
 
 /// Surfaces without a depth by reason, the commonest first.
-fn without_a_depth(summary: &Summary) -> Option<String> {
+fn without_a_depth(summary: &FrameSummary) -> Option<String> {
     let reasons = summary.no_depth.iter();
     let mut reasons: Vec<_> = reasons
         .filter(|(reason, _)| **reason != NoDepth::NoSurface)

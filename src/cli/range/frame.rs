@@ -12,12 +12,12 @@ use crate::files::{InputError, OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate, read_calibration};
-use crate::system::{PixelDepth, Ranged, Summary, TakenFrame, check_counts};
+use crate::system::{ArrayDepths, FrameSummary, PixelDepth, TakenFrame, check_counts};
 
 /// What is printed with `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
-    summary: Summary,
+    summary: FrameSummary,
     bin_m: f64,
     macropixels: &'a [PixelDepth],
 }
@@ -68,7 +68,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     Ok(say_unless_quiet(table)?)
 }
 
-fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
+fn write_csv(path: &Path, cols: usize, ranged: &ArrayDepths) -> anyhow::Result<()> {
     OutputFile::write_with(path, |out| {
         write!(
             out,

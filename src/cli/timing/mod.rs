@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use self::section::{Cell, Section};
+use self::section::{Section, SectionCell};
 use self::tables::Subject;
 use super::SensorArgs;
 use super::settings::SiliconArgs;
@@ -187,9 +187,9 @@ fn condition_table(args: &SiliconArgs, config: &SensorConfig, silicon: &Silicon)
     section.push([
         silicon.corner.name().into(),
         process.into(),
-        Cell::Number(voltage_v, 3),
-        Cell::Number(temperature_c, 1),
-        Cell::Number(Some(silicon.factor), 4),
+        SectionCell::Number(voltage_v, 3),
+        SectionCell::Number(temperature_c, 1),
+        SectionCell::Number(Some(silicon.factor), 4),
     ]);
     section
 }

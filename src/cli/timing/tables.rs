@@ -1,6 +1,6 @@
 //! The tables of `gdtof timing`, one function each.
 
-use super::section::{Cell, Section};
+use super::section::{Section, SectionCell};
 use crate::analysis::{
     CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, ReadTiming, TimingVerdict,
     corner_limits, factor_range, gate_works, load_works, longest, phases, read_works, reset,
@@ -213,8 +213,8 @@ fn serial_clk<W: Fn(Time) -> bool>(
 /// Headings of [`period_row`].
 const PERIODS: &[&str] = &["limited by", "static", "event-driven", "static (MHz)"];
 
-fn period_row(name: &str, paths: Option<Time>, gates: Option<Time>) -> [Cell; 4] {
-    let mhz = Cell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
+fn period_row(name: &str, paths: Option<Time>, gates: Option<Time>) -> [SectionCell; 4] {
+    let mhz = SectionCell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
     [name.into(), paths.into(), gates.into(), mhz]
 }
 
@@ -299,7 +299,7 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
     } else {
         "a code for each start value"
     };
-    let number = |n: u64| Cell::Number(Some(n as f64), 0);
+    let number = |n: u64| SectionCell::Number(Some(n as f64), 0);
     let title = format!("P-counter: {}", block.file().display());
     let headings = &["what", "this one", "built-in"];
     let mut section = Section::new("p_counter", title, headings);
@@ -309,7 +309,7 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
         number(built_in.transistors()),
     ]);
     let area = |config: &SensorConfig, circuit: &Module| match library_area(config) {
-        Some(um2) => Cell::Number(Some(um2), 1),
+        Some(um2) => SectionCell::Number(Some(um2), 1),
         None => number(circuit.area()),
     };
     section.push([
@@ -438,10 +438,10 @@ pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
         section.push([
             limit.process.name().into(),
             verdict.into(),
-            Cell::Number(limit.fails_below_v, 3),
-            Cell::Number(limit.fails_above_c, 1),
-            Cell::Number(limit.fails_above_v, 3),
-            Cell::Number(limit.fails_below_c, 1),
+            SectionCell::Number(limit.fails_below_v, 3),
+            SectionCell::Number(limit.fails_above_c, 1),
+            SectionCell::Number(limit.fails_above_v, 3),
+            SectionCell::Number(limit.fails_below_c, 1),
         ]);
     }
     section

@@ -1,7 +1,7 @@
 //! Eq. 17 against the chip: how often the fullest bin is the echo's.
 
 use super::trial::{Effect, Trial};
-use super::{Study, interval_text};
+use super::{MeasuredStudy, interval_text};
 use crate::chip::Overflow;
 use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, share};
@@ -265,7 +265,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let (sweep, chart) = sweep(frames)?;
     let grids = [sweep, failures(frames)?];
     Ok(measurement(1).study(&[("frames", frames)], grids, Some(chart)))

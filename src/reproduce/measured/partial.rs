@@ -19,7 +19,7 @@ use std::sync::OnceLock;
 
 use self::delay_line::OnDelayLines;
 use self::steps::{Detection, FEWEST, Measurement, detecting, measuring};
-use super::Study;
+use super::MeasuredStudy;
 use super::interval_text;
 use super::penalty::{ratio, sum};
 use crate::chip::{Sensor, SensorConfig, hslidar};
@@ -313,7 +313,7 @@ fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let all = measure_both(frames)?;
     let lines = measure_on_delay_lines(frames)?;
     let grids = [detections(&all), schemes(&all, &lines)];

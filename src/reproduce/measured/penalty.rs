@@ -7,7 +7,7 @@
 use super::detection::detected;
 use super::precision::{Estimator, by_formula, scatter};
 use super::trial::Trial;
-use super::{Study, interval_text};
+use super::{MeasuredStudy, interval_text};
 use crate::engine::EngineError;
 use crate::numerics::intervals::Estimate;
 use crate::numerics::probit::{ProbitPoint, crossing};
@@ -264,7 +264,7 @@ fn detections<'a>(wanted: f64, all: impl Iterator<Item = &'a Detection>) -> Grid
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let system = long_range();
     let wanted = system.goal.detection;
     let measure = |range_m: f64| Schemes::measure(&system, range_m, frames);

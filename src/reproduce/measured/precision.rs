@@ -1,7 +1,7 @@
 //! Eq. 20 and the Cramér-Rao bound against the chip: how far measured times scatter.
 
 use super::trial::{Effect, Trial};
-use super::{Study, interval_text};
+use super::{MeasuredStudy, interval_text};
 use rayon::prelude::*;
 
 use crate::engine::EngineError;
@@ -237,7 +237,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let (sweep, chart) = sweep(frames)?;
     let grids = [sweep, failures(frames)?];
     Ok(measurement(2).study(&[("frames", frames)], grids, Some(chart)))

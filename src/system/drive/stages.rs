@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::reuse::{Last, Light, Same, Spent};
+use super::reuse::{ExposureLight, PreviousFrame, Spent, UnchangedPixels};
 use super::settings::{DriveSettings, FrameTimes, Noise};
-use super::state::Drive;
+use super::state::DriveSimulation;
 use crate::engine::{Answer, EngineWork, Histograms, LitPixel, expose};
 use crate::guide::{GuideInput, GuideMap};
 use crate::scene::DVec3;
@@ -12,7 +12,7 @@ use crate::system::error::FrameError;
 use crate::system::frame::{check_not_stopped, load_starts};
 use crate::system::light::{lit, photon_stream, starts_of};
 use crate::system::pixel::PixelDepth;
-use crate::system::ranger::Known;
+use crate::system::ranger::PixelContext;
 use crate::system::settings::FrameSettings;
 use crate::system::stopwatch::{Stopwatch, timed};
 use crate::system::worlds::{self, LastWorld};
@@ -27,11 +27,11 @@ pub(super) struct Plan {
     pub(super) starts: Vec<u16>,
 }
 
-impl Drive<'_> {
+impl DriveSimulation<'_> {
     /// Asks the guide, and points the windows.
     pub(super) fn plan<A: Answer>(
         &mut self,
-        last: Option<&Last>,
+        last: Option<&PreviousFrame>,
         exposed: &impl Fn(usize) -> A,
         spent: &mut Spent,
     ) -> Result<Plan, FrameError> {
@@ -85,7 +85,12 @@ impl Drive<'_> {
     }
 
     /// The worlds of the exposure and their light, anew where they are not those of `before`.
-    pub(super) fn light(&self, plan: &Plan, before: Option<&Last>, spent: &mut Spent) -> Light {
+    pub(super) fn light(
+        &self,
+        plan: &Plan,
+        before: Option<&PreviousFrame>,
+        spent: &mut Spent,
+    ) -> ExposureLight {
         let FrameSettings {
             sensor,
             scene,
@@ -121,7 +126,7 @@ impl Drive<'_> {
         };
         let pixels = lit(sensor, &plan.wanted, &each);
         spent.run.light_s = clock.lap();
-        Light {
+        ExposureLight {
             stream,
             worlds,
             newest,
@@ -135,8 +140,8 @@ impl Drive<'_> {
     pub(super) fn load_and_expose<A: Answer>(
         &self,
         plan: &Plan,
-        light: &Light,
-        same: &Same,
+        light: &ExposureLight,
+        same: &UnchangedPixels,
         exposed: &(impl Fn(usize) -> A + Sync),
         spent: &mut Spent,
     ) -> Result<(Histograms, EngineWork), FrameError> {
@@ -176,12 +181,12 @@ impl Drive<'_> {
     pub(super) fn range(
         &self,
         plan: &Plan,
-        light: &Light,
-        same: &Same,
+        light: &ExposureLight,
+        same: &UnchangedPixels,
         histograms: &Histograms,
     ) -> Vec<PixelDepth> {
         self.ranger.of_array(histograms.counts(), |pixel, counts| {
-            let known = Known {
+            let known = PixelContext {
                 pixel,
                 start: plan.wanted[pixel],
                 true_m: light.truth.range_m[pixel],

@@ -5,7 +5,7 @@ use crate::engine::waveform::{self, View};
 use crate::engine::{GateSimulation, LitPixel};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::system::error::FrameError;
-use crate::system::settings::{EngineKind, FrameSettings, Probe};
+use crate::system::settings::{EngineKind, FrameSettings, GateProbe};
 use crate::waves::WaveFormat;
 
 /// A macropixel as its gates counted.
@@ -25,7 +25,7 @@ impl AtGates {
         settings: &FrameSettings,
         stream: &PhotonStream,
         pixels: &[LitPixel],
-        probe: &Probe,
+        probe: &GateProbe,
     ) -> Result<Self, FrameError> {
         let (sensor, exposure) = (&settings.sensor, &settings.exposure);
         let at = (probe.row, probe.col);

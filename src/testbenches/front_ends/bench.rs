@@ -107,13 +107,13 @@ impl Bench {
     }
 
     /// Counts of all front ends in this light.
-    pub(super) fn count(&self, photons_hz: f64) -> Point {
+    pub(super) fn count(&self, photons_hz: f64) -> RatePoint {
         let avalanches_hz = non_paralysable_hz(photons_hz, DEAD_TIME_NS * 1e-9);
         let seconds = AVALANCHES / (f64::from(SPADS) * avalanches_hz);
         let mut counter = Counter::new(self);
         self.simulate(photons_hz, BEGIN + Time::from_s(seconds), &mut counter);
         let hz = |count: u64| count as f64 / seconds;
-        Point {
+        RatePoint {
             photons_hz,
             seconds,
             avalanches: hz(counter.avalanches),
@@ -124,7 +124,7 @@ impl Bench {
 }
 
 /// What was counted at one rate, 1/s.
-pub(super) struct Point {
+pub(super) struct RatePoint {
     pub(super) photons_hz: f64,
     /// How long.
     pub(super) seconds: f64,

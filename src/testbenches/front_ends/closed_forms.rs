@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::bench::{Bench, DEAD_TIME_NS, Point, SPADS, STEPS, TOGETHER, WIRES};
+use super::bench::{Bench, DEAD_TIME_NS, RatePoint, SPADS, STEPS, TOGETHER, WIRES};
 use crate::chip::{ChipTiming, FrontEnd};
 use crate::files::InputError;
 use crate::logic::Logic;
@@ -97,7 +97,7 @@ fn mega(hz: f64) -> String {
 }
 
 /// What was counted, rate by rate.
-pub(super) fn table(points: &[Point]) -> String {
+pub(super) fn table(points: &[RatePoint]) -> String {
     let mut grid = Grid::headed(
         "in | avalanches | OR wire | XOR wire | coincidence wire | summation sampled \
         | OR sampled | XOR sampled | coincidence sampled",
@@ -114,32 +114,34 @@ pub(super) fn table(points: &[Point]) -> String {
 }
 
 /// Every rate against its closed form.
-pub(super) fn compare(points: &[Point], laws: &Laws, checks: &mut Checks) {
-    let mut worst =
-        |what: String, allowed: f64, law: &dyn Fn(f64) -> f64, found: &dyn Fn(&Point) -> f64| {
-            // Counts of a process no more irregular than Poisson's.
-            let errors = points.iter().map(|point| {
-                let (expected, found) = (law(point.photons_hz), found(point));
-                let noise = (expected * point.seconds).max(1.0).sqrt() / point.seconds;
-                let beyond = ((found - expected).abs() - 4.0 * noise).max(0.0) / expected;
-                let sigmas = (found - expected).abs() / noise;
-                (beyond, sigmas, found / expected - 1.0, point.photons_hz)
-            });
-            let errors: Vec<_> = errors.collect();
-            let beyond = errors.iter().map(|error| error.0).fold(0.0, f64::max);
-            let worst = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            let &(_, sigmas, off, at) = worst.expect("a sweep");
-            checks.that(
-                what,
-                format!("within {:.0} % beyond 4 sigma", 100.0 * allowed),
-                format!(
-                    "at worst {:+.1} %, {sigmas:.1} sigma, at {} M",
-                    100.0 * off,
-                    mega(at)
-                ),
-                beyond <= allowed,
-            );
-        };
+pub(super) fn compare(points: &[RatePoint], laws: &Laws, checks: &mut Checks) {
+    let mut worst = |what: String,
+                     allowed: f64,
+                     law: &dyn Fn(f64) -> f64,
+                     found: &dyn Fn(&RatePoint) -> f64| {
+        // Counts of a process no more irregular than Poisson's.
+        let errors = points.iter().map(|point| {
+            let (expected, found) = (law(point.photons_hz), found(point));
+            let noise = (expected * point.seconds).max(1.0).sqrt() / point.seconds;
+            let beyond = ((found - expected).abs() - 4.0 * noise).max(0.0) / expected;
+            let sigmas = (found - expected).abs() / noise;
+            (beyond, sigmas, found / expected - 1.0, point.photons_hz)
+        });
+        let errors: Vec<_> = errors.collect();
+        let beyond = errors.iter().map(|error| error.0).fold(0.0, f64::max);
+        let worst = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let &(_, sigmas, off, at) = worst.expect("a sweep");
+        checks.that(
+            what,
+            format!("within {:.0} % beyond 4 sigma", 100.0 * allowed),
+            format!(
+                "at worst {:+.1} %, {sigmas:.1} sigma, at {} M",
+                100.0 * off,
+                mega(at)
+            ),
+            beyond <= allowed,
+        );
+    };
     worst(
         "avalanches against the non-paralysable law".to_owned(),
         0.0,
@@ -167,9 +169,9 @@ pub(super) fn compare(points: &[Point], laws: &Laws, checks: &mut Checks) {
 }
 
 /// Where counts are most: measured in steps of the sweep, computed between them.
-pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
+pub(super) fn folds(points: &[RatePoint], laws: &Laws, checks: &mut Checks) {
     let step = libm::pow(10f64, 1.0 / f64::from(STEPS));
-    let most = |found: &dyn Fn(&Point) -> f64| {
+    let most = |found: &dyn Fn(&RatePoint) -> f64| {
         let best = points.iter().max_by(|a, b| found(a).total_cmp(&found(b)));
         best.expect("a sweep").photons_hz
     };
@@ -219,7 +221,7 @@ pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
 }
 
 /// The waveform's charts: the wires without a clock, and what CLK samples.
-pub(super) fn charts(waves: &Path, points: &[Point], laws: &Laws) -> Result<(), InputError> {
+pub(super) fn charts(waves: &Path, points: &[RatePoint], laws: &Laws) -> Result<(), InputError> {
     let axes = |y: &str| {
         let x = Axis::log("detectable photons on each SPAD (1/s)");
         (x, Axis::log(y))
@@ -228,7 +230,7 @@ pub(super) fn charts(waves: &Path, points: &[Point], laws: &Laws) -> Result<(), 
         let rates = (0..=180).map(|step| 1e6 * libm::pow(10f64, f64::from(step) / 60.0));
         rates.map(|hz| (hz, of(hz))).collect()
     };
-    let measured = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
+    let measured = |of: &dyn Fn(&RatePoint) -> f64| -> Vec<(f64, f64)> {
         points.iter().map(|p| (p.photons_hz, of(p))).collect()
     };
     let all = f64::from(SPADS);

@@ -38,7 +38,7 @@ type Drives<'a> = Box<dyn Iterator<Item = Drive> + Send + 'a>;
 /// let release = [(0, true), (3, false)].map(|(ns, level)| Drive::new(Time::from_ns(ns), reset, level));
 /// // A clock is a stream, too: 20 half periods, and no memory for them.
 /// let ticks = clock(clk, Frequency::from_hz(500_000_000), Time::ZERO, 0, 20);
-/// let stimulus = Stimulus::sorted(release).with(ticks);
+/// let stimulus = Stimulus::sorted(release).with_drives(ticks);
 /// let times: Vec<i64> = stimulus.map(|drive| drive.time.as_fs() / 1_000_000).collect();
 /// assert_eq!(times[..6], [0, 0, 1, 2, 3, 3]);
 /// ```

@@ -111,7 +111,7 @@ struct Frame {
 }
 
 /// A measurement, and how many of its frames have a full bin.
-struct Taken {
+struct DelayLineMeasurement {
     measurement: Measurement,
     full: u32,
 }
@@ -143,7 +143,7 @@ impl Chip<'_> {
         start: u16,
         step: &ExposureStep,
         frames: usize,
-    ) -> Result<Taken, EngineError> {
+    ) -> Result<DelayLineMeasurement, EngineError> {
         let cycles = measured_cycles(step);
         let frames = self.frames(start, step, cycles, frames)?;
         let (background_per_ns, signal) = self.levels(&frames);
@@ -162,7 +162,7 @@ impl Chip<'_> {
         let errors: Vec<f64> = errors.collect();
         let most = (1 << self.sensor.bin_bits) - 1;
         let full = frames.iter().filter(|frame| frame.counts.contains(&most));
-        Ok(Taken {
+        Ok(DelayLineMeasurement {
             measurement: Measurement::from_errors(&errors, cycles, wanted_ns(self.system)),
             full: full.count() as u32,
         })
