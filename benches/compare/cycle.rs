@@ -72,7 +72,9 @@ fn main() -> std::io::Result<()> {
             let packed = engine.pack(&starts, &pulses);
             let packing = clock.elapsed().as_secs_f64();
             let clock = ProcessTime::now();
-            histograms = engine.run(&starts, &packed).expect("it is levelised");
+            histograms = engine
+                .replay_packed(&starts, &packed)
+                .expect("it is levelised");
             println!("{:.9} {packing:.9}", clock.elapsed().as_secs_f64());
         }
         let counts = histograms.counts().iter().flat_map(|n| n.to_le_bytes());

@@ -77,8 +77,10 @@ impl Common {
         } = self;
         let (rows, cols) = shape;
         let bins = histograms.len() / (rows * cols);
-        let metres = |of: fn(&PixelDepth) -> Option<f64>| {
-            let values = pixels.iter().map(|pixel| of(pixel).unwrap_or(f64::NAN));
+        let metres = |distance: fn(&PixelDepth) -> Option<f64>| {
+            let values = pixels
+                .iter()
+                .map(|pixel| distance(pixel).unwrap_or(f64::NAN));
             map(py, shape, values.collect())
         };
         let point = |(at, pixel): (usize, &PixelDepth)| {

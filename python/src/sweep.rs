@@ -68,7 +68,7 @@ pub(crate) fn sweep_part<'py>(
         let study = read(&study, text.as_deref())?;
         let shard = Shard {
             part: shard.0,
-            of: shard.1,
+            parts: shard.1,
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|why| Failure::Simulation(why.to_string()))?;

@@ -86,8 +86,8 @@ fn system(
 /// A formula by its name, and how many arguments it takes.
 fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
     let word = |at: usize| words.get(at).map_or("", String::as_str);
-    fn boxed(of: impl Fn(&[f64]) -> f64 + Send + Sync + 'static) -> Formula {
-        Box::new(of)
+    fn boxed(formula: impl Fn(&[f64]) -> f64 + Send + Sync + 'static) -> Formula {
+        Box::new(formula)
     }
     Ok(match name {
         "detection_probability" => {

@@ -334,10 +334,12 @@ fn times(frame: &SpeedFrame, work: TimedWork, runs: u16) -> anyhow::Result<(Spre
         _ => cycle(),
     };
     if work == TimedWork::CyclePacking {
-        return timed(runs, || engine.run(&starts, &engine.pack(&starts, &pulses)));
+        return timed(runs, || {
+            engine.replay_packed(&starts, &engine.pack(&starts, &pulses))
+        });
     }
     let packed = engine.pack(&starts, &pulses);
-    timed(runs, || engine.run(&starts, &packed))
+    timed(runs, || engine.replay_packed(&starts, &packed))
 }
 
 /// Wall-clock and processor times of `runs` runs after one that is not counted.

@@ -116,7 +116,7 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
         say_unless_quiet(table)?;
         say_unless_quiet(format_args!(
             "\nThis is one of {} parts; when all are done: gdtof sweep merge {}\n",
-            shard.of,
+            shard.parts,
             folder.display()
         ))?;
     }
@@ -280,9 +280,10 @@ fn shard(text: &str) -> Result<Shard, String> {
         Some((number(part)?, number(of)?))
     });
     match numbers {
-        Some((part, of)) if (1..=of).contains(&part) && of <= 1_000_000 => {
-            Ok(Shard { part: part - 1, of })
-        }
+        Some((part, of)) if (1..=of).contains(&part) && of <= 1_000_000 => Ok(Shard {
+            part: part - 1,
+            parts: of,
+        }),
         _ => Err(
             "is not a part of a study; give a part and the number of parts, such as 3/16"
                 .to_owned(),

@@ -61,9 +61,9 @@ impl Panel<'_> {
         let camera_cols = cols * CAMERA_RAYS.0 as usize;
         picture.raster((left, first + TEXT_PX), camera_cols, ray_px, camera);
         let pixels = &self.frame.pixels;
-        let depths = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<_> {
+        let depths = |depth: &dyn Fn(usize) -> Option<f64>| -> Vec<_> {
             (0..pixels.len())
-                .map(|pixel| of(pixel).map_or(VOID, |m| colour_of(m, self.range_m)))
+                .map(|pixel| depth(pixel).map_or(VOID, |m| colour_of(m, self.range_m)))
                 .collect()
         };
         let maps = [

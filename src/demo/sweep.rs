@@ -163,7 +163,8 @@ fn square_on(truth: &GroundTruth) -> Vec<bool> {
         .filter(|&pixel| truth.object[pixel] == Some(1))
         .map(|pixel| ((pixel / cols) as f64, (pixel % cols) as f64))
         .collect();
-    let middle = |of: fn(&(f64, f64)) -> f64| mean(on_it.iter().map(of)).unwrap_or(0.0);
+    let middle =
+        |coordinate: fn(&(f64, f64)) -> f64| mean(on_it.iter().map(coordinate)).unwrap_or(0.0);
     let (row, col) = (middle(|p| p.0), middle(|p| p.1));
     // Rows and columns from the one that has the middle less half a side.
     let first = |middle: f64| (middle - (SIDE - 1) as f64 / 2.0).round().max(0.0) as usize;

@@ -252,14 +252,14 @@ fn solved(problem: &Problem, own: bool, points: &[DesignPoint]) -> Vec<DesignPoi
 }
 
 /// What `of` makes of the greatest number from 1 to `step` of which it makes something, to a thousandth; nothing if that is 1 or `step`.
-fn most_times<T>(step: f64, of: impl Fn(f64) -> Option<T>) -> Option<T> {
-    if of(step).is_some() {
+fn most_times<T>(step: f64, attempt: impl Fn(f64) -> Option<T>) -> Option<T> {
+    if attempt(step).is_some() {
         return None;
     }
     let (mut low, mut high, mut found) = (1.0, step, None);
     while high - low > 1e-3 {
         let middle = 0.5 * (low + high);
-        match of(middle) {
+        match attempt(middle) {
             Some(one) => (low, found) = (middle, Some(one)),
             None => high = middle,
         }

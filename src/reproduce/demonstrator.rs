@@ -46,7 +46,7 @@ pub(super) fn exposure_s() -> f64 {
 }
 
 /// A show, without its pictures.
-fn run(mut show: Show) -> ShowResult {
+fn run_show(mut show: Show) -> ShowResult {
     show.pictures.clear();
     let shown = show.run(&chain(), || ());
     shown.expect("the window engine follows delay lines")
@@ -54,7 +54,7 @@ fn run(mut show: Show) -> ShowResult {
 
 /// What became of a show's first target in its frames.
 fn found(show: Show) -> Vec<TargetSummary> {
-    let frames = run(show).frames.into_iter();
+    let frames = run_show(show).frames.into_iter();
     frames
         .filter_map(|frame| frame.targets.into_iter().next())
         .collect()
@@ -283,7 +283,7 @@ pub(super) fn glass_rows() -> Vec<ClaimRow> {
     let mut shows = shows::glass(&chain(), SEED);
     let mut show = shows.swap_remove(0);
     show.frames = 1;
-    let shown = run(show);
+    let shown = run_show(show);
     let outcome = |scheme: &str| -> &Outcome {
         let mut schemes = shown.schemes.iter();
         let outcome = schemes.find(|outcome| outcome.scheme == scheme);

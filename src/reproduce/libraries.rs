@@ -79,9 +79,9 @@ fn column(file: &Path) -> Result<(String, [String; FIGURES.len()]), InputError> 
     let reset_ps = (timing.reset_width() - timing.reset_need()).as_ns() * 1e3;
     let ns = |time: Option<Time>| time.map_or("none".to_owned(), |t| format!("{:.2}", t.as_ns()));
     let blocks = ["p_counter", "p_counter_timing"];
-    let share = |of: &dyn Fn(&str) -> f64| {
-        let whole: f64 = of("macropixel");
-        100.0 * blocks.iter().map(|block| of(block)).sum::<f64>() / whole
+    let share = |block_value: &dyn Fn(&str) -> f64| {
+        let whole: f64 = block_value("macropixel");
+        100.0 * blocks.iter().map(|block| block_value(block)).sum::<f64>() / whole
     };
     let (name, ratio, area, shares) = match library.from_file() {
         None => {

@@ -22,15 +22,15 @@ pub struct Shard {
     /// From 0.
     pub part: u64,
     /// At least 1.
-    pub of: u64,
+    pub parts: u64,
 }
 
 impl Shard {
     /// The whole.
-    pub const WHOLE: Shard = Shard { part: 0, of: 1 };
+    pub const WHOLE: Shard = Shard { part: 0, parts: 1 };
 
     fn journal(self) -> String {
-        match self.of {
+        match self.parts {
             1 => "journal.log".into(),
             of => format!("journal-{}-of-{of}.log", self.part + 1),
         }
@@ -38,7 +38,7 @@ impl Shard {
 
     /// How many of `points` points are its own.
     pub(crate) fn share(self, points: u64) -> u64 {
-        points.saturating_sub(self.part).div_ceil(self.of)
+        points.saturating_sub(self.part).div_ceil(self.parts)
     }
 }
 
@@ -203,7 +203,7 @@ impl SharedSweep<'_> {
         let mut lines = String::new();
         let mut counts = [0; 3];
         for at in batch {
-            let index = self.shard.part + at * self.shard.of;
+            let index = self.shard.part + at * self.shard.parts;
             let point = self.study.point(index);
             let Ok(ready) = self.subject.ready(&point, scratch) else {
                 // Found out again, and said, when the table is written.

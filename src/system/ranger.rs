@@ -239,12 +239,14 @@ impl<'a> Ranger<'a> {
     pub(crate) fn of_array<T: Send>(
         &self,
         counts: &[u16],
-        of: impl Fn(usize, &[u16]) -> T + Sync,
+        evaluate: impl Fn(usize, &[u16]) -> T + Sync,
     ) -> Vec<T> {
         let sensor = self.law.sensor();
         assert_eq!(counts.len(), sensor.pixels() * sensor.bins);
         let pixels = counts.par_chunks_exact(sensor.bins).enumerate();
-        pixels.map(|(pixel, counts)| of(pixel, counts)).collect()
+        pixels
+            .map(|(pixel, counts)| evaluate(pixel, counts))
+            .collect()
     }
 }
 

@@ -158,9 +158,13 @@ mod tests {
             let pulses: Vec<&[SpadEvent]> = pulses.iter().map(Vec::as_slice).collect();
             let cycle = Cycle::new(sensor, exposure);
             let packed = cycle.pack(&starts, &pulses);
-            let replayed = cycle.run(&starts, &packed).unwrap();
+            let replayed = cycle.replay_packed(&starts, &packed).unwrap();
             let live = Cycle::new(sensor, exposure).with_live_control();
-            assert_eq!(live.run(&starts, &packed).unwrap(), replayed, "{case:?}");
+            assert_eq!(
+                live.replay_packed(&starts, &packed).unwrap(),
+                replayed,
+                "{case:?}"
+            );
             let window = Window::new(sensor, exposure);
             assert_eq!(
                 window.histograms(&starts, &pulses).unwrap(),

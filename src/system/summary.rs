@@ -76,7 +76,7 @@ impl FrameSummary {
             .collect();
         let with_target = count(&|p| p.true_m.is_some());
         let outliers = errors.len() - without_outliers.len();
-        let share = |part: usize, of: usize| (of > 0).then(|| part as f64 / of as f64);
+        let share = |part: usize, whole: usize| (whole > 0).then(|| part as f64 / whole as f64);
         let missing = std::iter::repeat_n(f64::INFINITY, with_target - errors.len());
         let of_all = errors.iter().map(|e| e.abs()).chain(missing);
         let mut no_depth = BTreeMap::new();

@@ -313,7 +313,7 @@ fn compare(tdc: &Tdc, density: &Density, checks: &mut Checks) {
 }
 
 fn charts(waves: &Path, converters: &[Tdc], densities: &[Density]) -> Result<(), InputError> {
-    let chart = |what: &str, of: fn(&Linearity) -> &[f64]| {
+    let chart = |what: &str, steps: fn(&Linearity) -> &[f64]| {
         let x = Axis::linear("code");
         let mut chart = Chart::new(
             format!(
@@ -325,7 +325,7 @@ fn charts(waves: &Path, converters: &[Tdc], densities: &[Density]) -> Result<(),
         );
         for (tdc, density) in converters.iter().zip(densities) {
             let points = |linearity: &Linearity| -> Vec<(f64, f64)> {
-                let codes = of(linearity).iter().enumerate();
+                let codes = steps(linearity).iter().enumerate();
                 codes
                     .map(|(code, &value)| (code as f64 + 1.0, value))
                     .collect()

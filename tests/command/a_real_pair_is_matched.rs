@@ -140,7 +140,7 @@ fn calibrations_of_data_sets_are_taken_as_they_come() {
     assert_eq!(taken(middlebury), ours);
     // KITTI's does not say how many disparities to search, so that some are found elsewhere.
     let others = taken(&kitti);
-    let guided = |of: &serde_json::Value| of[36]["guide_m"].as_f64().unwrap();
+    let guided = |frame_pixels: &serde_json::Value| frame_pixels[36]["guide_m"].as_f64().unwrap();
     assert!((guided(&others) - guided(&ours)).abs() < 0.1);
     std::fs::write(
         here.path().join("calib.toml"),

@@ -52,7 +52,7 @@ fn compare(first_seed: u64, cases: u32, most: usize, expected: impl Fn(&Scenario
         tally.ran += 1;
         let cycle = Cycle::new(config, exposure);
         // Without the gate engine to fall back on.
-        let Ok(found) = cycle.run(starts, &cycle.pack(starts, &scenario.pulses())) else {
+        let Ok(found) = cycle.replay_packed(starts, &cycle.pack(starts, &scenario.pulses())) else {
             tally.unlevelled += 1;
             continue;
         };
@@ -121,7 +121,7 @@ fn as_the_gates_of_hslidar_count() {
             leave_out_races(&mut scenario);
             let Scenario { config, starts, .. } = &scenario;
             let cycle = Cycle::new(config, &exposure);
-            let found = cycle.run(starts, &cycle.pack(starts, &scenario.pulses()));
+            let found = cycle.replay_packed(starts, &cycle.pack(starts, &scenario.pulses()));
             assert_eq!(found, Ok(gates(&scenario)), "{config:?}");
             ran += starts.len();
         }

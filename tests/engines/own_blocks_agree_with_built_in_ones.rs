@@ -239,8 +239,8 @@ fn other_blocks_read_back_count_the_same_on_gates_and_cycles_and_have_no_law() {
 }
 
 /// Bits that a netlist's port or a cell's pin is connected to.
-fn bits(of: &mut Value) -> &mut Vec<Value> {
-    of.as_array_mut().unwrap()
+fn bits(connection: &mut Value) -> &mut Vec<Value> {
+    connection.as_array_mut().unwrap()
 }
 
 /// Connections of all cells of a type.
@@ -308,6 +308,12 @@ fn other_blocks_that_differ_show_it_on_gates_and_cycles() {
         }
     });
     let half = found(&half);
-    let total = |of: &Histograms| of.iter().flatten().map(|&n| u32::from(n)).sum::<u32>();
+    let total = |histograms: &Histograms| {
+        histograms
+            .iter()
+            .flatten()
+            .map(|&n| u32::from(n))
+            .sum::<u32>()
+    };
     assert!(0 < total(&half) && total(&half) < total(&built_in));
 }

@@ -117,8 +117,12 @@ fn fitted_on(captures: &[Capture], fit: Fit) -> Vec<bool> {
     fitted
 }
 
-fn calibrate(args: &RangeArgs, zones: usize, of: &[&Sighting]) -> Result<Calibration, InputError> {
-    let known = of.iter().filter_map(|s| Some((s.echo, s.true_m?)));
+fn calibrate(
+    args: &RangeArgs,
+    zones: usize,
+    sightings: &[&Sighting],
+) -> Result<Calibration, InputError> {
+    let known = sightings.iter().filter_map(|s| Some((s.echo, s.true_m?)));
     let known: Vec<(ZoneEcho, f64)> = known.collect();
     Calibration::fit(zones, &known).map_err(|error| {
         let message = format!("{error}; calibrate on other or more captures (--fit)");

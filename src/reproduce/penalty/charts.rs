@@ -138,16 +138,16 @@ pub(in crate::reproduce) fn figure_43() -> Chart {
 }
 
 /// What was measured, against range.
-fn points(on_chip: &OnChip, of: impl Fn(&AtRange) -> Option<f64>) -> Points {
+fn points(on_chip: &OnChip, value: impl Fn(&AtRange) -> Option<f64>) -> Points {
     let ranges = on_chip.ranges.iter();
     ranges
-        .filter_map(|at| Some((at.range_m, of(at)?)))
+        .filter_map(|at| Some((at.range_m, value(at)?)))
         .collect()
 }
 
 fn schemes(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
     let curves = Curves::new(on_chip.system, to_m);
-    let measured = |of: fn(&AtRange) -> Option<f64>| points(on_chip, of);
+    let measured = |value: fn(&AtRange) -> Option<f64>| points(on_chip, value);
     chart(figure)
         .line("full and guided", curves.full())
         .line("zooming", curves.zooming())

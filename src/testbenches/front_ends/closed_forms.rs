@@ -226,12 +226,15 @@ pub(super) fn charts(waves: &Path, points: &[RatePoint], laws: &Laws) -> Result<
         let x = Axis::log("detectable photons on each SPAD (1/s)");
         (x, Axis::log(y))
     };
-    let law = |of: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+    let law = |counts_hz: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
         let rates = (0..=180).map(|step| 1e6 * libm::pow(10f64, f64::from(step) / 60.0));
-        rates.map(|hz| (hz, of(hz))).collect()
+        rates.map(|hz| (hz, counts_hz(hz))).collect()
     };
-    let measured = |of: &dyn Fn(&RatePoint) -> f64| -> Vec<(f64, f64)> {
-        points.iter().map(|p| (p.photons_hz, of(p))).collect()
+    let measured = |counts_hz: &dyn Fn(&RatePoint) -> f64| -> Vec<(f64, f64)> {
+        points
+            .iter()
+            .map(|p| (p.photons_hz, counts_hz(p)))
+            .collect()
     };
     let all = f64::from(SPADS);
     let (x, y) = axes("counts of the macropixel (1/s)");

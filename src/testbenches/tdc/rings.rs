@@ -92,7 +92,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         pull_hz,
     };
     let least = row(0.0).least_pull_hz();
-    let coupled = [0.3, 1.1].map(|share| (share, row(share * least).run(4e-6)));
+    let coupled = [0.3, 1.1].map(|share| (share, row(share * least).mean_frequencies_hz(4e-6)));
     let locked = row(least).locked_hz();
     let mut text = format!(
         "{RINGS} rings, {:.1} MHz on average: spread {:.2} % alone",

@@ -174,7 +174,7 @@ pub(super) struct CellEnergy {
     /// The input that changes, or is behind the output's change; any where the file does not say.
     pub from: Option<usize>,
     /// Of the pin's rise and fall, fJ over the input's slew and the output's load.
-    pub of: [Table; 2],
+    pub tables: [Table; 2],
 }
 
 /// A chosen cell with its tables.
@@ -320,7 +320,11 @@ impl CellModel {
         };
         if let (Ok(rise), Ok(fall)) = (table("rise_power"), table("fall_power")) {
             let of = [rise, fall];
-            self.energies.push(CellEnergy { to, from, of });
+            self.energies.push(CellEnergy {
+                to,
+                from,
+                tables: of,
+            });
         } else {
             self.remark(Remark::Energy);
         }

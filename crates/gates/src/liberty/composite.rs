@@ -66,15 +66,15 @@ impl<'m> Composite<'m> {
     }
 
     /// Whether a signal within leads to an output or to a stage that does.
-    pub(super) fn is_read(&self, of: Source) -> bool {
+    pub(super) fn is_read(&self, signal: Source) -> bool {
         let outputs = self.recipe.outputs.iter().zip(self.is_connected);
         let stages = self.recipe.stages.iter().enumerate();
         outputs
             .into_iter()
-            .any(|(source, connected)| *source == of && connected)
+            .any(|(source, connected)| *source == signal && connected)
             || stages
                 .into_iter()
-                .any(|(stage, made)| made.sources.contains(&of) && self.is_used(stage))
+                .any(|(stage, made)| made.sources.contains(&signal) && self.is_used(stage))
     }
 
     /// What the cell of a stage is called, of the instance at `path`: without dots, at which some readers of SDF cut names.
@@ -101,11 +101,11 @@ impl<'m> Composite<'m> {
     }
 
     /// Load of this instance's own cells on a signal within it, fF.
-    fn load_at(&self, of: Source) -> ByEdge {
+    fn load_at(&self, signal: Source) -> ByEdge {
         let mut load = [0.0; 2];
         for (stage, made) in self.recipe.stages.iter().enumerate() {
             for (pin, source) in made.sources.iter().enumerate() {
-                if *source == of && self.is_used(stage) {
+                if *source == signal && self.is_used(stage) {
                     let own = self.cell(stage).inputs[pin].load_ff;
                     load = std::array::from_fn(|edge| load[edge] + own[edge]);
                 }
@@ -265,7 +265,7 @@ impl<'m> Composite<'m> {
                 let each = cell.energies.iter().filter(ours).map(|energy| {
                     let (weight, slew) = changes_and_slew(energy.from.unwrap_or(0), changes);
                     let [rise, fall] = energy
-                        .of
+                        .tables
                         .each_ref()
                         .map(|table| table.interpolate(slew, load));
                     (weight, 0.5 * (rise + fall))

@@ -39,13 +39,13 @@ pub(super) struct Placing<'d> {
 /// One cell as Yosys has it.
 struct YosysCell<'d> {
     name: &'d str,
-    of: &'d CellEntry,
+    entry: &'d CellEntry,
     inverses: &'d HashMap<u64, u64>,
 }
 
 impl YosysCell<'_> {
     fn inverse_of_q(&self) -> Option<u64> {
-        match self.of.connections.get("Q")?.as_slice() {
+        match self.entry.connections.get("Q")?.as_slice() {
             [Bit::Net(q)] => self.inverses.get(q).copied(),
             _ => None,
         }
@@ -78,20 +78,27 @@ impl<'d> Placing<'d> {
     pub(super) fn cell(
         &mut self,
         name: &str,
-        of: &CellEntry,
+        entry: &CellEntry,
         inverses: &HashMap<u64, u64>,
     ) -> Result<(), YosysError> {
-        if of.kind == "$scopeinfo" {
+        if entry.kind == "$scopeinfo" {
             return Ok(());
         }
-        if place(self, &YosysCell { name, of, inverses })? {
+        if place(
+            self,
+            &YosysCell {
+                name,
+                entry,
+                inverses,
+            },
+        )? {
             Ok(())
         } else {
             Err(YosysError::Cell {
                 module: self.module.to_owned(),
                 cell: name.to_owned(),
-                kind: of.kind.clone(),
-                why: cure(&of.kind),
+                kind: entry.kind.clone(),
+                why: cure(&entry.kind),
             })
         }
     }
@@ -183,14 +190,14 @@ impl<'d> Placing<'d> {
         self.constant(value).ok_or_else(|| YosysError::Pin {
             module: self.module.to_owned(),
             cell: given.name.to_owned(),
-            kind: given.of.kind.clone(),
+            kind: given.entry.kind.clone(),
             pin: pin.to_owned(),
             problem: "must be constant, which takes an input of the module; give it one",
         })
     }
 
     fn pin(&mut self, given: &YosysCell<'_>, pin: &str) -> Result<Net, YosysError> {
-        let problem = match given.of.connections.get(pin).map(Vec::as_slice) {
+        let problem = match given.entry.connections.get(pin).map(Vec::as_slice) {
             Some([bit]) => match self.net(bit) {
                 Some(net) => return Ok(net),
                 None => "is connected to a net that nothing drives; drive it",
@@ -201,7 +208,7 @@ impl<'d> Placing<'d> {
         Err(YosysError::Pin {
             module: self.module.to_owned(),
             cell: given.name.to_owned(),
-            kind: given.of.kind.clone(),
+            kind: given.entry.kind.clone(),
             pin: pin.to_owned(),
             problem,
         })
@@ -218,8 +225,8 @@ impl<'d> Placing<'d> {
 
 /// Places the cells that do what a cell of this type does; false where there are none.
 fn place(to: &mut Placing<'_>, given: &YosysCell<'_>) -> Result<bool, YosysError> {
-    let kind = given.of.kind.as_str();
-    if let Some(function) = &given.of.of_library {
+    let kind = given.entry.kind.as_str();
+    if let Some(function) = &given.entry.of_library {
         library::place(to, given, function)?;
         return Ok(true);
     }

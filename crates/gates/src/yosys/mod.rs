@@ -152,8 +152,8 @@ impl Module {
                 .and_then(|library| library.function(&cell.kind))
                 .cloned();
         }
-        let is_top = |of: &YosysModule| {
-            let top = of.attributes.get("top").map(ToString::to_string);
+        let is_top = |module: &YosysModule| {
+            let top = module.attributes.get("top").map(ToString::to_string);
             top.is_some_and(|value| value.contains('1'))
         };
         let names = || modules.iter().map(|(name, _)| name.clone()).collect();

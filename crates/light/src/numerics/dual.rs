@@ -31,9 +31,9 @@ impl<const K: usize> Dual<K> {
     }
 
     /// Parameter number `of` itself.
-    pub fn parameter(value: f64, of: usize) -> Self {
+    pub fn parameter(value: f64, index: usize) -> Self {
         let mut dual = Self::constant(value);
-        dual.slope[of] = 1.0;
+        dual.slope[index] = 1.0;
         dual
     }
 

@@ -106,7 +106,7 @@ impl<'a> Avalanches<'a> {
     /// met a blind SPAD. The state must be known.
     pub(crate) fn run_to_the_end(mut self, photons: &[Photon], edges: &mut Vec<SpadEvent>) -> u64 {
         let forever = Time::from_fs(i64::MAX);
-        let known = self.run(photons, None, forever, forever, edges);
+        let known = self.append_edges(photons, None, forever, forever, edges);
         debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
         self.lost
     }
@@ -120,7 +120,7 @@ impl<'a> Avalanches<'a> {
         edges: &mut Vec<SpadEvent>,
     ) {
         let before = edges.len();
-        let known = rows.run(light, from, Some(&mut self.blind_until), from, edges);
+        let known = rows.append_edges(light, from, Some(&mut self.blind_until), from, edges);
         debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
         self.lost += (rows.photons() - (edges.len() - before)) as u64;
     }
@@ -130,7 +130,7 @@ impl<'a> Avalanches<'a> {
     ///
     /// # Errors
     /// Where an edge from `wanted_from` on, or a photon of `echoes`, depends on a SPAD whose state is not known.
-    pub fn run(
+    pub fn append_edges(
         &mut self,
         photons: &[Photon],
         mut echoes: Option<&mut OrderedEchoes<'_>>,
@@ -320,7 +320,7 @@ mod tests {
             let mut avalanches = Avalanches::known_from(&model, [7, 8], 1, &dead_times, from, breeding);
             let mut edges = Vec::new();
             let forever = Time::from_fs(i64::MAX);
-            if avalanches.run(known, None, forever, wanted_from, &mut edges).is_ok() {
+            if avalanches.append_edges(known, None, forever, wanted_from, &mut edges).is_ok() {
                 all.retain(|edge| edge.time >= wanted_from);
                 edges.retain(|edge| edge.time >= wanted_from);
                 prop_assert_eq!(all, edges);
@@ -359,7 +359,7 @@ mod tests {
                 Avalanches::known_from(&model, [0; 2], 0, &[], from, std::iter::empty());
             let (forever, wanted) = (Time::from_fs(i64::MAX), Time::from_fs(wanted_from));
             let mut edges = Vec::new();
-            let known = avalanches.run(photons, None, forever, wanted, &mut edges);
+            let known = avalanches.append_edges(photons, None, forever, wanted, &mut edges);
             known.map(|()| edges.len())
         };
         assert_eq!(run(&[photon(1_100)], 0), Ok(1));

@@ -345,8 +345,8 @@ impl GlintGroup {
     /// Greatest share of their photons on the wrong side of an instant, were they one Gaussian.
     fn distance(&self, glints: &[Glint], pulse_fs2: f64) -> f64 {
         let sigma_fs = (self.variance_fs2 + pulse_fs2).sqrt();
-        let column = |of: fn(&Glint, f64) -> f64| -> SmallVec<[f64; 64]> {
-            glints.iter().map(|glint| of(glint, pulse_fs2)).collect()
+        let column = |value: fn(&Glint, f64) -> f64| -> SmallVec<[f64; 64]> {
+            glints.iter().map(|glint| value(glint, pulse_fs2)).collect()
         };
         let arrivals_fs = column(|glint, _| glint.arrival_fs);
         let own_fs = column(|glint, pulse_fs2| {

@@ -110,7 +110,7 @@ impl PhotonStream {
             };
             let now = photons.partition_point(|photon| photon.time < until);
             edges.clear();
-            let known = avalanches.run(&photons[..now], None, until, until, &mut edges);
+            let known = avalanches.append_edges(&photons[..now], None, until, until, &mut edges);
             debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
             photons.drain(..now);
             drawn += now as u64;
@@ -179,7 +179,7 @@ impl PhotonStream {
             } else {
                 sort_photons(&mut photons, from, &mut keys);
                 let echoes = (!echoes.is_empty()).then_some(&mut echoes);
-                let known = avalanches.run(&photons, echoes, until, until, &mut edges);
+                let known = avalanches.append_edges(&photons, echoes, until, until, &mut edges);
                 debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
             }
             photons.clear();

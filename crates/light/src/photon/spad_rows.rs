@@ -85,7 +85,7 @@ impl SpadRows {
     ///
     /// # Errors
     /// Where an edge from `wanted_from` on depends on what came before `from`.
-    pub fn run(
+    pub fn append_edges(
         &self,
         light: &PixelStream<'_>,
         from: Time,
@@ -223,16 +223,16 @@ mod tests {
             let mut found = Vec::new();
             let mut blind_until = [Time::from_fs(from_fs - 1); 4];
             let before = knows_all.then_some(&mut blind_until[..]);
-            let is_known = rows.run(&parts[0], from, before, wanted_from, &mut found);
+            let is_known = rows.append_edges(&parts[0], from, before, wanted_from, &mut found);
             photons.sort_unstable();
             let known = &photons[photons.len() - known.len()..];
             let mut without_past = parts[0].avalanches((!knows_all).then_some(from), std::iter::empty());
-            let without_past = without_past.run(known, None, until, wanted_from, &mut Vec::new());
+            let without_past = without_past.append_edges(known, None, until, wanted_from, &mut Vec::new());
             prop_assert_eq!(is_known, without_past);
             if is_known.is_ok() {
                 let mut expected = Vec::new();
                 let mut with_past = parts[0].avalanches(None, std::iter::empty());
-                prop_assert!(with_past.run(&photons, None, until, from, &mut expected).is_ok());
+                prop_assert!(with_past.append_edges(&photons, None, until, from, &mut expected).is_ok());
                 for edges in [&mut found, &mut expected] {
                     edges.retain(|edge| edge.time >= wanted_from);
                 }

@@ -248,7 +248,7 @@ mod tests {
             let all: Vec<_> = all
                 .map(|e| (e.photons, e.photons * e.arrival.as_range_m()))
                 .collect();
-            let sum = |of: fn(&(f64, f64)) -> f64| all.iter().map(of).sum::<f64>();
+            let sum = |term: fn(&(f64, f64)) -> f64| all.iter().map(term).sum::<f64>();
             (sum(|e| e.0), sum(|e| e.1) / sum(|e| e.0))
         };
         let ((direct, direct_m), (_, centre_m)) = (centre_m(0), centre_m(1024));

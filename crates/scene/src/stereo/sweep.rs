@@ -46,7 +46,7 @@ struct Job<'a> {
 }
 
 /// Matches two images; settings have been checked.
-pub(super) fn run(
+pub(super) fn match_images(
     matcher: &Matcher,
     workspace: &mut Workspace,
     left: &GreyImage,

@@ -52,7 +52,7 @@ pub struct Coincidence {
     /// How long an output is high after the last photon of its SPAD, s.
     pub within_s: f64,
     /// SPADs on which the light comes evenly.
-    pub of: u32,
+    pub lit_spads: u32,
 }
 
 /// What counts photons, and the laser pulses that it sees.
@@ -304,7 +304,7 @@ impl Detector {
             together: self.coincidence.map(|coincidence| FiringTogether {
                 least: coincidence.spads,
                 within_bins: coincidence.within_s / bin_s,
-                of_spads: coincidence.of,
+                of_spads: coincidence.lit_spads,
             }),
             first_only: self.counted == CountedEvents::First,
             parts: f64::from(all_parts) / cycles,

@@ -303,8 +303,8 @@ fn fired_in<const K: usize>(
         let of_pulse = until[step + 1] - until[step];
         let of_background = background * lengths[step];
         let (hit, late) = ((of_pulse + of_background) * missed, 1.0 - missed);
-        let of: &[f64; 4] = sums[first..first + 4].try_into().expect("four");
-        let now = (of[0] * a + of[1] * b) + (of[2] * c + of[3] * d);
+        let around: &[f64; 4] = sums[first..first + 4].try_into().expect("four");
+        let now = (around[0] * a + around[1] * b) + (around[2] * c + around[3] * d);
         let ending = now - ended;
         ended = now;
         if K > 0 {

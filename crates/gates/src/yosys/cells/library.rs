@@ -27,7 +27,7 @@ pub(super) fn place(
     let [reset, set] = [flip_flop.clear, flip_flop.preset].map(|pin| Some(active(to, pin?)));
     let outputs = [flip_flop.q, flip_flop.qn].map(|output| {
         let name = &function.outputs[output?];
-        let is_open = given.of.connections.get(name).is_none_or(Vec::is_empty);
+        let is_open = given.entry.connections.get(name).is_none_or(Vec::is_empty);
         (!is_open).then(|| to.pin(given, name))
     });
     let [q, qn] = outputs.map(Option::transpose);

@@ -191,12 +191,12 @@ proptest! {
         let photons: f64 = echoes.iter().map(|echo| echo.photons).sum();
         let sent: f64 = glints.iter().map(|glint| glint.photons).sum();
         prop_assert!((photons / sent - 1.0).abs() < 1e-12);
-        let mean = |of: &dyn Fn(f64, f64) -> f64| -> [f64; 2] {
+        let mean = |moment: &dyn Fn(f64, f64) -> f64| -> [f64; 2] {
             let echo = echoes.iter().map(|e| {
                 let sigma = e.sigma.unwrap().as_fs() as f64 / SIGMA_FS;
-                e.photons * of(e.arrival.as_fs() as f64 / SIGMA_FS - 400.0, sigma * sigma)
+                e.photons * moment(e.arrival.as_fs() as f64 / SIGMA_FS - 400.0, sigma * sigma)
             });
-            let glint = glints.iter().map(|g| g.photons * of(g.arrival_fs / SIGMA_FS - 400.0, 1.0));
+            let glint = glints.iter().map(|g| g.photons * moment(g.arrival_fs / SIGMA_FS - 400.0, 1.0));
             [echo.sum::<f64>() / sent, glint.sum::<f64>() / sent]
         };
         for of in [&|z: f64, _: f64| z, &|z: f64, own: f64| z * z + own] as [&dyn Fn(f64, f64) -> f64; 2] {

@@ -27,7 +27,11 @@ use crate::chip::MOST_SPADS;
 use crate::photon::DeadTimeLaw;
 
 /// Counts of every bin after these laser cycles.
-pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+pub(super) fn draw_counts(
+    like: &LikeCycles,
+    is_event: &EventTable,
+    random: &mut RandomWords,
+) -> Counts {
     let mut tree = Tree::new(&like.blindness, is_event.spads(), like.cycles);
     tree.age(&like.ages, random);
     like.means

@@ -248,9 +248,9 @@ impl Cohort {
         let is_event = &self.is_event;
         for LikeCyclesMethod { like, way } in prepared.iter().flatten() {
             let counts = match way {
-                StateMethod::Pooled => pooled::run(like, is_event, random),
-                StateMethod::Recent(histories) => histories.run(like.cycles, random),
-                StateMethod::Joint => joint::run(like, is_event, random),
+                StateMethod::Pooled => pooled::draw_counts(like, is_event, random),
+                StateMethod::Recent(histories) => histories.draw_counts(like.cycles, random),
+                StateMethod::Joint => joint::draw_counts(like, is_event, random),
             };
             let compared = sums.iter_mut().zip(counts).skip(like.not_compared);
             compared.for_each(|(sum, count)| *sum += count);

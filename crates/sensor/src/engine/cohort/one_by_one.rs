@@ -8,7 +8,11 @@ use super::words::RandomWords;
 use crate::photon::DeadTimeLaw;
 
 /// Events of every bin of one of these laser cycles.
-pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+pub(super) fn draw_counts(
+    like: &LikeCycles,
+    is_event: &EventTable,
+    random: &mut RandomWords,
+) -> Counts {
     let blindness = &like.blindness;
     // The step of each SPAD's last avalanche, counted from the window's first.
     let fired_before = |random: &mut RandomWords| {
@@ -63,8 +67,8 @@ mod tests {
                 let mut random = RandomWords::new(5, 0);
                 let mut both = [[[0u32; BINS]; BINS]; 2];
                 for _ in 0..TRIALS {
-                    let reference = run(&like, &is_event, &mut random);
-                    let tree = joint::run(&like, &is_event, &mut random);
+                    let reference = draw_counts(&like, &is_event, &mut random);
+                    let tree = joint::draw_counts(&like, &is_event, &mut random);
                     for (both, counts) in both.iter_mut().zip([reference, tree]) {
                         for (a, both) in both.iter_mut().enumerate() {
                             for (b, both) in both.iter_mut().enumerate() {

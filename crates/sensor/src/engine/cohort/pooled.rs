@@ -55,7 +55,11 @@ pub(super) fn looked_at(blindness: &Blindness, photons: f64, spads: u64) -> f64 
 
 /// Counts of every bin after these laser cycles.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+pub(crate) fn draw_counts(
+    like: &LikeCycles,
+    is_event: &EventTable,
+    random: &mut RandomWords,
+) -> Counts {
     let odds = odds(&like.means);
     let cycles = like.cycles;
     let spads = is_event.spads() as u64 * cycles;

@@ -175,13 +175,13 @@ impl Histories {
     }
 
     /// Counts of every bin after `cycles` laser cycles.
-    pub(super) fn run(&self, cycles: u64, random: &mut RandomWords) -> Counts {
-        run(self, cycles, random)
+    pub(super) fn draw_counts(&self, cycles: u64, random: &mut RandomWords) -> Counts {
+        draw_counts(self, cycles, random)
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn run(histories: &Histories, cycles: u64, random: &mut RandomWords) -> Counts {
+fn draw_counts(histories: &Histories, cycles: u64, random: &mut RandomWords) -> Counts {
     let rows = histories.rows();
     let mut present = vec![[0; LANES]; rows];
     present[rows - 1][LANES - 1] = cycles;
@@ -366,10 +366,10 @@ mod tests {
                 let mut random = RandomWords::new(6, 0);
                 let mut seen = [vec![[0u32; 32]; BINS - 4], vec![[0u32; 32]; BINS - 4]];
                 for _ in 0..TRIALS {
-                    let reference = one_by_one::run(&like, &is_event, &mut random);
+                    let reference = one_by_one::draw_counts(&like, &is_event, &mut random);
                     for (seen, counts) in seen
                         .iter_mut()
-                        .zip([reference, histories.run(1, &mut random)])
+                        .zip([reference, histories.draw_counts(1, &mut random)])
                     {
                         for (seen, bins) in seen.iter_mut().zip(counts.windows(5)) {
                             let word = bins.iter().fold(0, |word, &bin| word << 1 | bin as usize);

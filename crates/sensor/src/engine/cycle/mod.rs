@@ -154,7 +154,11 @@ impl Cycle {
     ///
     /// # Errors
     /// As [`Cycle::unlevelled`], or when an edge goes where the tape has no place for it.
-    pub fn run(&self, starts: &[u16], packed: &PackedPulses) -> Result<Histograms, Unlevelled> {
+    pub fn replay_packed(
+        &self,
+        starts: &[u16],
+        packed: &PackedPulses,
+    ) -> Result<Histograms, Unlevelled> {
         let machine = self.machine().map_err(Unlevelled::clone)?;
         let blocks: Result<Vec<_>, Unlevelled> = packed
             .blocks
@@ -163,7 +167,7 @@ impl Cycle {
                 let starts: Vec<u16> = pixels.iter().map(|&pixel| starts[pixel]).collect();
                 let schedule =
                     Schedule::new(&machine.levelised.causes, &self.exposure, self.clocked());
-                machine.run(schedule, self.replays_control, &starts, pulses)
+                machine.replay_block(schedule, self.replays_control, &starts, pulses)
             })
             .collect();
         let mut histograms = Histograms::empty(starts.len(), self.sensor.bins);
@@ -178,7 +182,7 @@ impl Cycle {
 
 impl Machine {
     /// Histograms of one block.
-    fn run(
+    fn replay_block(
         &self,
         schedule: Schedule<'_>,
         replays_control: bool,
@@ -193,7 +197,7 @@ impl Machine {
         } = &self.levelised;
         let mut block = Block::new(tape, self.start(starts)?);
         let mut flow = Flow::new(stream, pulses);
-        passes::run(
+        passes::run_passes(
             tape,
             parts,
             &mut block,
@@ -268,7 +272,7 @@ impl Replay for Cycle {
         let pulses: Vec<&[SpadEvent]> = seen.iter().map(|pulses| &**pulses).collect();
         refuse_races(&self.law, starts.iter().copied())?;
         if self.unlevelled().is_none()
-            && let Ok(histograms) = self.run(&starts, &self.pack(&starts, &pulses))
+            && let Ok(histograms) = self.replay_packed(&starts, &self.pack(&starts, &pulses))
         {
             return Ok(histograms);
         }

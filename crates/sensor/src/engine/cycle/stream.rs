@@ -133,7 +133,7 @@ impl StreamTape {
                 words[place as usize + pulse.period()].flip(pulse.lane());
             }
         }
-        run(&self.ops, words);
+        apply_ops(&self.ops, words);
     }
 }
 
@@ -388,7 +388,7 @@ fn chunk(words: &[Cell<Word>], place: u32) -> &[Cell<Word>] {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn run(ops: &[Op], words: &mut [Word]) {
+fn apply_ops(ops: &[Op], words: &mut [Word]) {
     let words = Cell::from_mut(words).as_slice_of_cells();
     for op in ops {
         let [a, b, c] = op.inputs;

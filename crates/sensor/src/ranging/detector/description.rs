@@ -172,7 +172,7 @@ fn checked(coincidence: DescribedCoincidence) -> Result<Coincidence, BadDetector
     Ok(Coincidence {
         spads,
         within_s: 1e-9 * within_ns,
-        of,
+        lit_spads: of,
     })
 }
 

@@ -76,7 +76,7 @@ impl Detector {
         if self.counted == CountedEvents::First
             && let Some(laser_cycles) = self.laser_cycles
         {
-            let sum = |of: fn(&(f64, f64)) -> f64| cells.iter().map(of).sum::<f64>();
+            let sum = |term: fn(&(f64, f64)) -> f64| cells.iter().map(term).sum::<f64>();
             let without = f64::from(laser_cycles) - sum(|cell| cell.1);
             let counted = f64::from(laser_cycles) - sum(|cell| cell.0);
             if without >= LEAST_EXPECTED {

@@ -37,7 +37,7 @@ fn together(counted: CountedEvents, spads: u32) -> Detector {
     let coincidence = Coincidence {
         spads,
         within_s: 4e-9,
-        of: 16,
+        lit_spads: 16,
     };
     Detector {
         coincidence: Some(coincidence),
@@ -103,11 +103,11 @@ fn histogram(random: &mut StdRng, detector: &Detector, light: &Light) -> Vec<u32
     let Coincidence {
         spads,
         within_s,
-        of,
+        lit_spads: of,
     } = detector.coincidence.unwrap_or(Coincidence {
         spads: 1,
         within_s: 0.0,
-        of: 1,
+        lit_spads: 1,
     });
     // Background comes before the first bin, too.
     let before_s = 2.0 * within_s;

@@ -37,7 +37,7 @@ impl RingRow {
     }
 
     /// Mean frequency of each ring, Hz, over the second half of `seconds` from a common start, by Runge and Kutta's method.
-    pub fn run(&self, seconds: f64) -> Vec<f64> {
+    pub fn mean_frequencies_hz(&self, seconds: f64) -> Vec<f64> {
         // The fastest change is that of a ring between two neighbours; phases are taken relative to the mean.
         let mean = self.locked_hz();
         let spread = self.free_hz.iter().map(|hz| (hz - mean).abs());
@@ -111,11 +111,11 @@ mod tests {
                 }
             };
             let locked = row(1.05);
-            let found = locked.run(20e-6);
+            let found = locked.mean_frequencies_hz(20e-6);
             assert!(spread(&found) < 1.0, "{found:?}");
             assert!((found[0] - locked.locked_hz()).abs() < 1.0);
-            assert!(spread(&row(0.95).run(20e-6)) > 1e5);
-            let alone = row(0.0).run(1e-6);
+            assert!(spread(&row(0.95).mean_frequencies_hz(20e-6)) > 1e5);
+            let alone = row(0.0).mean_frequencies_hz(1e-6);
             assert!((alone[1] - free_hz[1]).abs() < 1.0);
         }
     }
@@ -127,7 +127,7 @@ mod tests {
             free_hz: vec![1.00e9, 1.02e9],
             pull_hz: 6e6,
         };
-        let found = row.run(200e-6);
+        let found = row.mean_frequencies_hz(200e-6);
         let beat = (20e6f64.powi(2) - 12e6f64.powi(2)).sqrt();
         let off = (found[1] - found[0]) / beat - 1.0;
         assert!(off.abs() < 1e-3, "{off}");

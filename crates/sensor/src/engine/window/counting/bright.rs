@@ -219,7 +219,7 @@ impl Counting<'_> {
                 let mut ready = [Time::from_fs(-1); MOST_SPADS];
                 let before = begin.time.is_none().then_some(&mut ready[..]);
                 let (rows, events) = (&self.rows, &mut self.events);
-                let known = rows.run(pixel.light, known_from, before, wanted_from, events);
+                let known = rows.append_edges(pixel.light, known_from, before, wanted_from, events);
                 if known.is_ok() {
                     break self.photons.len() as u64;
                 }
@@ -233,7 +233,7 @@ impl Counting<'_> {
             let mut avalanches = pixel.light.avalanches(begin.time, earlier.copied());
             let (photons, events) = (&self.photons, &mut self.events);
             let seen = Some(&mut echoes).filter(|echoes| !echoes.is_empty());
-            let known = avalanches.run(photons, seen, until, wanted_from, events);
+            let known = avalanches.append_edges(photons, seen, until, wanted_from, events);
             if known.is_ok() {
                 break self.photons.len() as u64 + echoes.drawn;
             }

@@ -223,7 +223,8 @@ impl Counting<'_> {
             let mut avalanches = pixel.light.avalanches(known_from, breeding.copied());
             self.events.clear();
             let photons = &self.photons[earlier..later.max(earlier)];
-            let known = avalanches.run(photons, None, until, wanted_from, &mut self.events);
+            let known =
+                avalanches.append_edges(photons, None, until, wanted_from, &mut self.events);
             if known.is_ok() {
                 return;
             }
