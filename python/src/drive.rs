@@ -137,7 +137,7 @@ impl Drive {
                 Ok(Err(failure)) => return drop(begin.send(Ok(Err(failure)))),
                 Err(panic) => return drop(begin.send(Err(panic))),
             };
-            go(&settings, &theirs, &begin, &asked, &give);
+            take_frames(&settings, &theirs, &begin, &asked, &give);
         })?;
         let (_, beginning) = wait(py, begun, &watch, None);
         let Beginning {
@@ -208,7 +208,7 @@ impl Drop for Drive {
 }
 
 /// Takes frames as long as they are asked for.
-fn go(
+fn take_frames(
     settings: &DriveSettings,
     watch: &Watch,
     begin: &SyncSender<Outcome<Beginning>>,

@@ -84,7 +84,7 @@ impl Common {
             map(py, shape, values.collect())
         };
         let point = |(at, pixel): (usize, &PixelDepth)| {
-            let towards = camera.towards((at / cols, at % cols));
+            let towards = camera.direction((at / cols, at % cols));
             pixel.measured_m.map(|m| (towards * m).to_array())
         };
         let points: Vec<[f64; 3]> = pixels.iter().enumerate().filter_map(point).collect();

@@ -66,7 +66,7 @@ impl Guide {
     }
 
     /// All that it does follows from this: what it is, with every key, and every value of maps.
-    fn said(&self) -> String {
+    fn debug_text(&self) -> String {
         format!("{:?}", self.guide)
     }
 
@@ -203,13 +203,13 @@ impl Guide {
         let other = other.cast::<Self>();
         other.is_ok_and(|other| {
             let other = other.get();
-            Arc::ptr_eq(&self.guide, &other.guide) || self.said() == other.said()
+            Arc::ptr_eq(&self.guide, &other.guide) || self.debug_text() == other.debug_text()
         })
     }
 
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
-        self.said().hash(&mut hasher);
+        self.debug_text().hash(&mut hasher);
         hasher.finish()
     }
 

@@ -135,7 +135,9 @@ impl Foxglove {
             .filter(shown)
             .filter_map(|pixel| {
                 let (from_m, to_m) = frame.windows_m[pixel]?;
-                let ray = self.camera.towards((pixel / self.cols, pixel % self.cols));
+                let ray = self
+                    .camera
+                    .direction((pixel / self.cols, pixel % self.cols));
                 Some([from_m, to_m].map(|m| xyz(ray * m)))
             });
         let none = json!([]);

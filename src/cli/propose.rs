@@ -82,7 +82,7 @@ const CORNERS: [&str; 5] = [
 /// Bad input, a goal that no design reaches, unwritable output.
 pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
-    let (goal, space) = asked(args)?;
+    let (goal, space) = goal_and_space(args)?;
     let problem = Problem::new(goal, sensor, &scene)?;
     let results = ResultSet::begin(&args.out, "propose")?;
     let clocks = space.clk_hz.len() * space.thresholds.len();
@@ -158,7 +158,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
 }
 
 /// What is asked for, and what is tried.
-fn asked(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
+fn goal_and_space(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
     let goal = Goal {
         range_m: args.range,
         reflectivity: args.reflectivity,
@@ -260,7 +260,7 @@ fn headings(area: &str) -> Vec<String> {
 }
 
 /// A measurement beside its theory.
-fn beside(theory: f64, measured: &Estimate, decimals: usize) -> String {
+fn theory_and_measured(theory: f64, measured: &Estimate, decimals: usize) -> String {
     format!("{theory:.decimals$} / {:.decimals$}", measured.value)
 }
 
@@ -271,8 +271,8 @@ fn grid(corners: &[Corner], found: &SearchResult, area: &str) -> Grid {
         let own = [(*name).to_owned()].into_iter().chain(cells(point));
         let share = check.detection.map(|share| 100.0 * share);
         grid.push(own.chain([
-            beside(100.0 * point.detection, &share, 2),
-            beside(point.precision_m, &check.precision_m, 3),
+            theory_and_measured(100.0 * point.detection, &share, 2),
+            theory_and_measured(point.precision_m, &check.precision_m, 3),
         ]));
     }
     if let Some(point) = found.own.point() {

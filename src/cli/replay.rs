@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::asked::WaveFormatOption;
 use super::sdf::annotated_timing;
 use super::settings::SiliconArgs;
-use super::voice::{aside, note, progress, say_json};
+use super::voice::{note, progress, say_json, table_to_stderr};
 use crate::ORIGIN;
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{SensorConfig, Silicon};
@@ -191,7 +191,7 @@ impl Summary {
     /// Says on standard error what the chip loses silently.
     fn print_losses(&self, config: &SensorConfig) {
         if let Some(coverage) = &self.time_keeping {
-            aside(table(coverage));
+            table_to_stderr(table(coverage));
         }
         let unmet = self.timing.as_ref().filter(|timing| !timing.met);
         if let (Some(timing), true) = (unmet, self.engine != EngineKind::Gate) {
@@ -251,7 +251,7 @@ fn replay_array(
                 checks: checks.report(simulation.netlist()),
                 events: &events.report,
             };
-            aside(format_args!("{}{}", report.checks, report.events));
+            table_to_stderr(format_args!("{}{}", report.checks, report.events));
             // Before the histograms, which unknown states may have spoilt: this says why.
             if let Some(path) = &args.checks_json {
                 OutputFile::write_with(path, |w| Ok(serde_json::to_writer_pretty(w, &report)?))?;
@@ -299,7 +299,7 @@ fn watch(
     record(simulation, stimuli, args, &mut (&mut activity, observer))?;
     let end = simulation.now();
     OutputFile::write_with(saif, |out| {
-        let nets = activity.until(end);
+        let nets = activity.net_activity(end);
         write_saif(out, &netlist, &nets, end, args.saif_glitches, ORIGIN)
     })
 }

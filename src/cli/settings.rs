@@ -90,7 +90,7 @@ impl SensorArgs {
     ///
     /// # Errors
     /// As [`SensorArgs::read`].
-    pub(super) fn given(&self) -> Result<Option<Sensor>, InputError> {
+    pub(super) fn read_if_given(&self) -> Result<Option<Sensor>, InputError> {
         let has_file = self.sensor.is_some() || !self.liberty.is_empty();
         let has_size = self.rows.is_some() || self.cols.is_some();
         let is_given = has_file || has_size || !self.block.is_empty() || !self.set.is_empty();

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::voice::{counted, note, notes, progress, say_unless_quiet};
+use super::voice::{note, notes, progress, quantity, say_unless_quiet};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
@@ -94,7 +94,7 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
     if outcome.spoilt_lines > 0 {
         note(format_args!(
             "damaged in the journal: {}; their points were taken anew",
-            counted(outcome.spoilt_lines, "line")
+            quantity(outcome.spoilt_lines, "line")
         ));
     }
     let mut table = outcome_table(&study, &outcome, seconds);

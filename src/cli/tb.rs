@@ -86,7 +86,7 @@ struct RunResult {
 /// # Errors
 /// Unknown names and files that cannot be written.
 pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
-    let sensor = args.sensor.given()?;
+    let sensor = args.sensor.read_if_given()?;
     let sensor = sensor.as_deref();
     let testbenches = chosen(&args.names, sensor)?;
     let entries = if args.list {
@@ -200,7 +200,7 @@ fn run_one(
     let checks = testbench.run(sensor, &set.staging().join(&file))?;
     Ok(RunResult {
         passed: checks.passed(),
-        checked: checks.made(),
+        checked: checks.count(),
         failed: checks.failed(),
         run_time_s: begin.elapsed().as_secs_f64(),
         waveform: waves.out.join(file),

@@ -148,7 +148,7 @@ fn best(windows: &[Vec<PixelDepth>], prefers: Preference) -> Vec<PixelDepth> {
 }
 
 impl Bench<'_> {
-    fn lit(&self, start_of: impl Fn(usize) -> Option<u16>, farthest: u16) -> Vec<LitPixel> {
+    fn lit_pixels(&self, start_of: impl Fn(usize) -> Option<u16>, farthest: u16) -> Vec<LitPixel> {
         let pixels = self.pixels.iter();
         pixels
             .map(|&pixel| LitPixel {
@@ -193,7 +193,7 @@ impl Bench<'_> {
             ..options
         };
         let ranger = Ranger::new(sensor, &exposure, self.world, &options, Some(calibration))?;
-        let lit = self.lit(&start_of, sensor.largest_start());
+        let lit = self.lit_pixels(&start_of, sensor.largest_start());
         let histograms = self.expose(sensor, &exposure, salt, &lit)?;
         let depth = |(n, &pixel): (usize, &usize)| {
             let known = PixelContext {
@@ -228,7 +228,7 @@ impl Bench<'_> {
                 let at = self.pixels.iter().position(|&p| p == pixel);
                 starts[at.expect("one of them")]
             };
-            let lit = self.lit(place, sensor.largest_start());
+            let lit = self.lit_pixels(place, sensor.largest_start());
             let histograms = self.expose(&sensor, &exposure, 900 + step as u64, &lit)?;
             for ((look, start), counts) in looks.iter_mut().zip(&starts).zip(&histograms) {
                 let window = start.and_then(|start| law.window(start).open());

@@ -32,7 +32,7 @@ impl Target {
     }
 
     /// What became of it in a frame.
-    pub(crate) fn found(&self, frame: &DriveFrame) -> TargetSummary {
+    pub(crate) fn summary(&self, frame: &DriveFrame) -> TargetSummary {
         let pixels = self.pixels(&frame.truth).map(|pixel| &frame.pixels[pixel]);
         TargetSummary::summarise(pixels, frame.bin_m)
     }
@@ -141,7 +141,7 @@ impl Show {
             shown.frames.push(ShownFrame {
                 number,
                 times: frame.times,
-                targets: self.targets.iter().map(|t| t.found(&frame)).collect(),
+                targets: self.targets.iter().map(|t| t.summary(&frame)).collect(),
                 run_times: frame.run_times,
             });
             done();

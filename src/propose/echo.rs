@@ -68,7 +68,7 @@ impl BinnedEcho {
     }
 
     /// Through a window of `bins` bins.
-    pub(super) fn through(&self, bins: usize) -> WindowedEcho {
+    pub(super) fn windowed(&self, bins: usize) -> WindowedEcho {
         let first = BINS / 2 - bins / 2;
         let windows = || self.phases.iter().map(|phase| &phase[first..first + bins]);
         let width = Scan::matched(self.sigma_bins, bins, 1).width;

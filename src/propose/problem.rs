@@ -374,7 +374,7 @@ impl Problem {
     /// The same with `least` laser cycles or more.
     pub(super) fn judge_from(&self, choice: &Choice, least: u32) -> Result<Candidate, Limit> {
         let echo = self.echo(choice.clk_hz, choice.threshold, choice.pulse_energy_uj);
-        let (seen, cycles) = (echo.through(choice.bins), (least, MOST_CYCLES));
+        let (seen, cycles) = (echo.windowed(choice.bins), (least, MOST_CYCLES));
         let mut found = None;
         self.designs(choice, &seen, cycles, &[choice.rate_hz], |one| {
             found = Some(one)

@@ -174,7 +174,7 @@ fn of_clock(
             if is_done[at] {
                 continue;
             }
-            let seen = echo.through(bins);
+            let seen = echo.windowed(bins);
             let choice = Choice {
                 bins,
                 clk_hz,
@@ -333,7 +333,7 @@ pub fn search(
         Ok(()) if of_own.points.is_empty() => Own::Impossible(limit_of(problem, &own_space, true)),
         Ok(()) => {
             let solved_for = solved(problem, true, &of_own.points);
-            beside(&front, [of_own.points, solved_for].concat())
+            compare_own(&front, [of_own.points, solved_for].concat())
         }
     };
     Ok(SearchResult { tried, front, own })
@@ -348,7 +348,7 @@ fn timed(problem: &Problem, config: &SensorConfig) -> Result<(), Limit> {
 }
 
 /// The sensor's own designs beside the front.
-fn beside(best: &[ConfirmedDesign], mut own: Vec<DesignPoint>) -> Own {
+fn compare_own(best: &[ConfirmedDesign], mut own: Vec<DesignPoint>) -> Own {
     own.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
     let beats = |point: &DesignPoint| {
         let own = point.costs();

@@ -158,7 +158,7 @@ fn the_demonstrators_precision_is_that_of_the_thesis() {
     assert!((signal * 75.0 * 75.0 / 89.0 - 1.0).abs() < 0.01, "{signal}");
     assert!((background_hz / 8e6 - 1.0).abs() < 0.02, "{background_hz}");
     let bin_ns = 2.6;
-    let seen = problem.echo(1e9 / bin_ns, 0, counted_uj).through(8);
+    let seen = problem.echo(1e9 / bin_ns, 0, counted_uj).windowed(8);
     let cycles = seen.variance(0.1) * (bin_ns / time_ns(0.1)).powi(2);
     let sigma_ns = scene.pulse_sigma().as_ns();
     let bound = cramer_rao_laser_cycles(

@@ -58,7 +58,7 @@ impl Axis {
 
     /// The same axis from `least` to `greatest`.
     #[must_use]
-    pub(crate) fn between(mut self, least: f64, greatest: f64) -> Self {
+    pub(crate) fn with_range(mut self, least: f64, greatest: f64) -> Self {
         self.range = Some((least, greatest));
         self
     }
@@ -351,7 +351,7 @@ mod tests {
     #[test]
     fn every_pair_of_scales_is_drawn_and_text_is_escaped() {
         for x in [Axis::linear("x"), Axis::log("x")] {
-            for y in [Axis::linear("y"), Axis::log("y").between(1.0, 1e3)] {
+            for y in [Axis::linear("y"), Axis::log("y").with_range(1.0, 1e3)] {
                 let svg = chart(x.clone(), y).svg();
                 assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
                 assert!(svg.contains("Squares &amp; more") && svg.contains("&lt;exact&gt;"));

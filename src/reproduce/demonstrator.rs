@@ -53,7 +53,7 @@ fn run_show(mut show: Show) -> ShowResult {
 }
 
 /// What became of a show's first target in its frames.
-fn found(show: Show) -> Vec<TargetSummary> {
+fn target_summaries(show: Show) -> Vec<TargetSummary> {
     let frames = run_show(show).frames.into_iter();
     frames
         .filter_map(|frame| frame.targets.into_iter().next())
@@ -213,14 +213,15 @@ pub(super) fn figure_103() -> Chart {
 /// Claim 23: the van.
 pub(super) fn tracking_rows() -> Vec<ClaimRow> {
     let claim = claim(23);
-    let from = |from_m: f64| found(shows::van_at(&chain(), shows::VAN_M_S, from_m, SEED));
+    let from =
+        |from_m: f64| target_summaries(shows::van_at(&chain(), shows::VAN_M_S, from_m, SEED));
     let legs = VAN_FROM_M.map(from);
     let frames = legs.concat();
     let where_found = frames.iter().filter(|found| found.is_found());
     let farthest_m = where_found.clone().filter_map(|found| found.true_m);
     let missed = frames.iter().filter(|found| !found.is_found());
     let missed: Vec<String> = missed.map(ToString::to_string).collect();
-    let fast = found(shows::van_at(&chain(), 5.0, 70.0, SEED));
+    let fast = target_summaries(shows::van_at(&chain(), 5.0, 70.0, SEED));
     let mut rows = vec![
         claim.row("found", where_found.count() as f64 / frames.len() as f64).remark(format!(
             "{} frames, four from each of 22, 35, 50 and 72 m on; the van drives away at 2 m/s, which is chosen. {}",
@@ -247,7 +248,7 @@ pub(super) fn fog_rows() -> Vec<ClaimRow> {
     };
     let car = |visibility_m| lower(shows::car_in_fog(&chain(), visibility_m, SEED));
     let cars: Vec<(f64, Vec<TargetSummary>)> = shows::CAR_VISIBILITIES_M
-        .map(|visibility_m| (visibility_m, found(car(visibility_m))))
+        .map(|visibility_m| (visibility_m, target_summaries(car(visibility_m))))
         .into();
     let seen = cars
         .iter()
@@ -260,7 +261,7 @@ pub(super) fn fog_rows() -> Vec<ClaimRow> {
     for part in people.filter(|object| object.name.starts_with("pedestrian")) {
         part.velocity_m_s = DVec3::new(0.0, 0.0, part.velocity_m_s.length());
     }
-    let in_window = |show: Show| share_in_window(&found(show));
+    let in_window = |show: Show| share_in_window(&target_summaries(show));
     let mut rows = vec![
         claim.row("least_visibility", least_m.fold(f64::INFINITY, f64::min)).remark(format!(
             "At {:.1} m; published: up to 60 m, without the fog's visibility. Fog is what one sees less than a kilometre through (WMO). 5 klux, car of 35 %.",
@@ -306,10 +307,10 @@ pub(super) fn glass_rows() -> Vec<ClaimRow> {
 /// Claim 26: what throws a target out of its window.
 pub(super) fn motion_rows() -> Vec<ClaimRow> {
     let claim = claim(26);
-    let slipped = found(shows::pedestrian(&chain(), -0.1, SEED));
-    let straight = found(shows::pedestrian(&chain(), 0.0, SEED));
-    let fast = found(shows::car(&chain(), 65.0, SEED));
-    let slow = found(shows::car(&chain(), 5.0, SEED));
+    let slipped = target_summaries(shows::pedestrian(&chain(), -0.1, SEED));
+    let straight = target_summaries(shows::pedestrian(&chain(), 0.0, SEED));
+    let fast = target_summaries(shows::car(&chain(), 65.0, SEED));
+    let slow = target_summaries(shows::car(&chain(), 5.0, SEED));
     vec![
         claim.row("slipped", share_right(&slipped)),
         claim.row("straight", share_right(&straight)),

@@ -55,14 +55,14 @@ pub fn tally(report: &Report) -> String {
     format!(
         "Of {} claims: {}.\nOf {} rows: {}.",
         claim_verdicts.len(),
-        counted(&claim_verdicts).join(", "),
+        verdict_counts(&claim_verdicts).join(", "),
         row_verdicts.len(),
-        counted(&row_verdicts).join(", "),
+        verdict_counts(&row_verdicts).join(", "),
     )
 }
 
 /// "80 agree", "5 differ" and so on, of every verdict.
-fn counted(verdicts: &[Verdict]) -> [String; Verdict::ALL.len()] {
+fn verdict_counts(verdicts: &[Verdict]) -> [String; Verdict::ALL.len()] {
     Verdict::ALL.map(|verdict| {
         let count = verdicts.iter().filter(|&&v| v == verdict).count();
         format!("{count} {}", plural(verdict))
@@ -283,7 +283,7 @@ fn tallies(report: &Report) -> String {
     let claims: Vec<Verdict> = report.claims.iter().map(|c| overall(&c.rows)).collect();
     let rows: Vec<Verdict> = report.rows().map(ClaimRow::verdict).collect();
     let badges = |verdicts: &[Verdict]| {
-        let badges = counted(verdicts).into_iter().zip(Verdict::ALL);
+        let badges = verdict_counts(verdicts).into_iter().zip(Verdict::ALL);
         let badges =
             badges.map(|(text, v)| format!("<span class='badge {}'>{text}</span> ", class(v)));
         badges.collect::<String>()

@@ -60,7 +60,7 @@ pub struct Report {
 pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
     let frames = selection.frames.unwrap_or(measured::FRAMES);
     let claims = || {
-        let made = made(&CLAIMS, &selection.claims, &done, |rows| rows());
+        let made = make_numbered(&CLAIMS, &selection.claims, &done, |rows| rows());
         let made = made.into_iter().map(|NumberedItem { number, title, it }| {
             let text = thesis::claim(number);
             debug_assert!(
@@ -76,10 +76,10 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
         });
         made.collect::<Vec<_>>()
     };
-    let tables = || made(&TABLES, &selection.tables, &done, |grid| grid());
-    let figures = || made(&FIGURES, &selection.figures, &done, |chart| chart());
+    let tables = || make_numbered(&TABLES, &selection.tables, &done, |grid| grid());
+    let figures = || make_numbered(&FIGURES, &selection.figures, &done, |chart| chart());
     let study = |measure: registry::Measure| measure(frames).expect("what the engines run");
-    let measurements = || made(&MEASUREMENTS, &selection.measurements, &done, study);
+    let measurements = || make_numbered(&MEASUREMENTS, &selection.measurements, &done, study);
     let ((claims, tables), (figures, measurements)) = rayon::join(
         || rayon::join(claims, tables),
         || rayon::join(figures, measurements),
@@ -99,7 +99,7 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
 }
 
 /// Makes those of these numbers, each by itself, in the order of `all`.
-fn made<F: Copy + Sync, T: Send>(
+fn make_numbered<F: Copy + Sync, T: Send>(
     all: &[NumberedItem<F>],
     numbers: &[u32],
     done: &(impl Fn() + Sync),

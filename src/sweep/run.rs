@@ -122,15 +122,15 @@ pub fn run<A: Answer>(
     };
     if points < 2 * workers && study.kind == StudyKind::Frame {
         // Too few to go round: all threads on one frame after the other.
-        work.go(&done);
+        work.take_points(&done);
     } else {
         std::thread::scope(|scope| {
             for _ in 0..workers {
                 scope.spawn(
                     || match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-                        Ok(own) => own.install(|| work.go(&done)),
+                        Ok(own) => own.install(|| work.take_points(&done)),
                         // No more threads to be had: in the common pool, slower.
-                        Err(_) => work.go(&done),
+                        Err(_) => work.take_points(&done),
                     },
                 );
             }
@@ -171,7 +171,7 @@ struct SharedSweep<'a> {
 
 impl SharedSweep<'_> {
     /// Takes points until there are no more.
-    fn go<A: Answer>(&self, done: &(impl Fn(u64) -> A + Sync)) {
+    fn take_points<A: Answer>(&self, done: &(impl Fn(u64) -> A + Sync)) {
         let mut scratch = Scratch::default();
         while !self.failed.load(Ordering::Relaxed) {
             let begin = self.next.fetch_add(self.batch, Ordering::Relaxed);

@@ -291,7 +291,7 @@ struct FrameResult<'a> {
 }
 
 impl FrameResult<'_> {
-    fn without(&self, reason: NoDepth) -> usize {
+    fn count_without(&self, reason: NoDepth) -> usize {
         let number = self.summary.no_depth.get(&reason);
         number.copied().unwrap_or(0)
     }
@@ -326,7 +326,7 @@ macro_rules! fields {
 fn results() -> Vec<(String, Of)> {
     let no_depth = |reason: NoDepth| {
         let name = reason.name().replace(' ', "_").to_lowercase();
-        let pixels_without = move |t: &FrameResult| t.without(reason);
+        let pixels_without = move |t: &FrameResult| t.count_without(reason);
         (
             format!("no_depth_{name}"),
             Of::Whole(Box::new(pixels_without)),

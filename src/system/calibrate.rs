@@ -84,7 +84,7 @@ pub fn calibrate(
     let exposure = Exposure::new(sensor, stop_periods, sweep.laser_cycles);
     let law = WindowLaw::new(sensor, &exposure);
     let starts = [0, 1].map(|parity| {
-        let seen = seen(sensor, &exposure, parity);
+        let seen = swept_starts(sensor, &exposure, parity);
         let wanted = if sweep.every_window { usize::MAX } else { 1 };
         seen.take(wanted).collect::<Vec<u16>>()
     });
@@ -236,7 +236,7 @@ pub enum BinSweepError {
 
 /// The even (`parity` 0) or odd (1) start values whose windows lie within the laser cycle and after the laser's trigger, by half a
 /// line for mismatch.
-fn seen(sensor: &Sensor, exposure: &Exposure, parity: u16) -> impl Iterator<Item = u16> {
+fn swept_starts(sensor: &Sensor, exposure: &Exposure, parity: u16) -> impl Iterator<Item = u16> {
     let law = WindowLaw::new(sensor.alike(), exposure);
     let half = Time::from_fs(sensor.longest_delay_line().as_fs() / 4);
     let end = exposure.stop(1) - exposure.stop(0) - half;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use self::at_gates::AtGates;
 use super::error::FrameError;
-use super::light::{light_in, lit, photon_stream, starts_of, truth_in};
+use super::light::{light_in, lit_pixels, photon_stream, starts_of, truth_in};
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{PixelContext, Ranger};
@@ -255,7 +255,7 @@ impl Plan<'_> {
         };
         Light {
             truth,
-            pixels: lit(&s.sensor, self.wanted, &each),
+            pixels: lit_pixels(&s.sensor, self.wanted, &each),
             stream,
             each,
         }

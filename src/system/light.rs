@@ -50,7 +50,7 @@ pub(super) fn starts_of(sensor: &SensorConfig, wanted: &[Option<u16>]) -> Vec<u1
 }
 
 /// Every macropixel of the array with its start value and, where its SPADs are on, its light.
-pub(super) fn lit(
+pub(super) fn lit_pixels(
     sensor: &SensorConfig,
     wanted: &[Option<u16>],
     light: &[PixelLight],

@@ -299,7 +299,7 @@ impl ParetoSettings {
             illuminance_klux: cell.illuminance_klux,
             run_time_ns,
             speed_up: reference.time_ns / run_time_ns,
-            errors: Errors::between(&law, &cell.pixels, &run.exposed, exact, scale),
+            errors: Errors::compare(&law, &cell.pixels, &run.exposed, exact, scale),
         })
     }
 }

@@ -168,7 +168,7 @@ pub struct PixelDepth {
 pub(crate) fn cloud(camera: &PinholeCamera, cols: usize, pixels: &[PixelDepth]) -> Vec<CloudPoint> {
     let points = pixels.iter().enumerate().flat_map(|(pixel, of)| {
         let (row, col) = (pixel / cols, pixel % cols);
-        let towards = camera.towards((row, col));
+        let towards = camera.direction((row, col));
         let point = move |(number, found): (u16, &DepthReturn)| CloudPoint {
             at_m: (towards * found.depth_m).to_array().map(|x| x as f32),
             intensity: found.photons as f32,

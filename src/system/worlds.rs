@@ -51,7 +51,7 @@ pub(super) fn truths(
                 world: &worlds[n - 1],
                 truth,
             }),
-            None => last.map(LastWorld::seen),
+            None => last.map(LastWorld::previous_world),
         };
         let before = before.filter(|_| reuse);
         let (truth, kept) = GroundTruth::render_after(world, rows, cols, before);
@@ -76,7 +76,7 @@ pub(super) fn lights(
                 let (world, truth) = (&worlds[n - 1], &truths[n - 1]);
                 Some((PreviousWorld { world, truth }, &light[..]))
             }
-            None => last.map(|last| (last.seen(), &last.light[..])),
+            None => last.map(|last| (last.previous_world(), &last.light[..])),
         };
         let before = before.filter(|_| reuse);
         lights.push(world.light_after(truth, &stream.config().spads, before));
@@ -98,7 +98,7 @@ impl LastWorld {
         })
     }
 
-    fn seen(&self) -> PreviousWorld<'_> {
+    fn previous_world(&self) -> PreviousWorld<'_> {
         PreviousWorld {
             world: &self.world,
             truth: &self.truth,

@@ -360,7 +360,7 @@ fn whole_sensor(checks: &mut Checks) {
     let all = (Time::ZERO, Time::MAX);
     duration(config, &recorder, &bench, all, &what, checks);
     let (bits, us) = (config.load_bits(), found.duration.as_s() * 1e6);
-    checks.that(
+    checks.add_verdict(
         format!(
             "{what}: kbit, and time at {} MHz (4.7)",
             config.load_clk_hz / 1e6

@@ -168,7 +168,7 @@ fn middle(law: &WindowLaw, window: &OpenWindow, cycle: u32, bin: i64) -> Time {
 }
 
 /// What the gates count with one start value; `None` where a bin is unknown.
-fn counted(
+fn gate_counts(
     config: &SensorConfig,
     exposure: &Exposure,
     start: u16,
@@ -199,7 +199,7 @@ fn by_law(
 }
 
 /// Histograms and other lists, or that there is none.
-fn shown<T: Debug>(counts: &Option<T>) -> String {
+fn counts_text<T: Debug>(counts: &Option<T>) -> String {
     counts
         .as_ref()
         .map_or("unknown".to_owned(), |c| format!("{c:?}"))
@@ -258,16 +258,16 @@ fn two_windows(
 
     checks.equal(
         "start values loaded",
-        shown(&Some(starts)),
-        shown(&gate.loaded().into_iter().collect::<Option<Vec<u16>>>()),
+        counts_text(&Some(starts)),
+        counts_text(&gate.loaded().into_iter().collect::<Option<Vec<u16>>>()),
     );
     let histograms = gate.histograms().ok();
     for (pixel, &start) in starts.iter().enumerate() {
         let found = histograms.as_ref().map(|h| &h[pixel]);
         checks.equal(
             format!("start value {start}: histogram, against the window law"),
-            shown(&Some(by_law(&config, &exposure, start, &pulses))),
-            shown(&found),
+            counts_text(&Some(by_law(&config, &exposure, start, &pulses))),
+            counts_text(&found),
         );
     }
     let (later, earlier) = match &histograms {
@@ -275,7 +275,7 @@ fn two_windows(
         None => (&[][..], &[][..]),
     };
     let is_telling = later.iter().any(|&n| n != later[0]);
-    checks.that(
+    checks.add_verdict(
         format!(
             "bins 0 up of {} are bins {shift} up of {}",
             starts[0], starts[1]
@@ -292,7 +292,7 @@ fn two_windows(
         // Each edge of CLK is rounded to a femtosecond.
         let expected = exposure.clock.periods(shift as i64);
         let found = *later - *earlier;
-        checks.that(
+        checks.add_verdict(
             format!(
                 "laser cycle {cycle}: LOCAL_STOP {} before that of {}",
                 starts[1], starts[0]
@@ -388,7 +388,7 @@ fn bin_edge(checks: &mut Checks) {
     for offset_fs in -2..=2 {
         let time = edge + Time::from_fs(offset_fs);
         let mut pulse = [SpadEvent { time, spad: 7 }];
-        let found = counted(&config, &exposure, start, &mut pulse);
+        let found = gate_counts(&config, &exposure, start, &mut pulse);
         let bins = |counts: &[u16]| -> Vec<usize> {
             (0..counts.len()).filter(|&b| counts[b] > 0).collect()
         };
@@ -397,8 +397,8 @@ fn bin_edge(checks: &mut Checks) {
                 "photon {offset_fs:+} fs from the edge of bins {} and {bin}: bin",
                 bin - 1
             ),
-            shown(&Some([if offset_fs < 0 { bin - 1 } else { bin }])),
-            shown(&found.map(|counts| bins(&counts))),
+            counts_text(&Some([if offset_fs < 0 { bin - 1 } else { bin }])),
+            counts_text(&found.map(|counts| bins(&counts))),
         );
     }
 }
@@ -421,18 +421,18 @@ fn full_bins(checks: &mut Checks) {
             })
             .collect();
         let hits = pulses.len() as u64;
-        let found = counted(&config, &exposure, start, &mut pulses);
+        let found = gate_counts(&config, &exposure, start, &mut pulses);
         checks.equal(
             format!(
                 "{hits} photons in a bin of {} bits, overflow = {overflow:?}",
                 config.bin_bits
             ),
-            shown(&Some(histogram::model(
+            counts_text(&Some(histogram::model(
                 hits,
                 config.bin_bits as u32,
                 overflow,
             ))),
-            shown(&found.map(|counts| counts[bin as usize])),
+            counts_text(&found.map(|counts| counts[bin as usize])),
         );
     }
 }
@@ -471,15 +471,15 @@ fn coincidences(sensor: &SensorConfig, checks: &mut Checks) {
         let expected: Vec<u16> = (0..config.bins)
             .map(|bin| correlation::model(spads(bin), event_type, threshold) as u16)
             .collect();
-        let found = counted(&config, &exposure, start, &mut pulses);
+        let found = gate_counts(&config, &exposure, start, &mut pulses);
         checks.equal(
             format!(
                 "0 to {} coincident photons, TYPE = {event_type:?} than {threshold}",
                 config.bins - 1
             )
             .replace("Equal than", "Equal to"),
-            shown(&Some(expected)),
-            shown(&found),
+            counts_text(&Some(expected)),
+            counts_text(&found),
         );
     }
 }
@@ -519,12 +519,12 @@ fn cancelling_pulses(checks: &mut Checks) {
         ),
     ];
     for (what, mut pulses, before, within) in cases {
-        let found = counted(&config, &exposure, start, &mut pulses);
+        let found = gate_counts(&config, &exposure, start, &mut pulses);
         let bin = bin as usize;
         checks.equal(
             format!("{what}: bins {} and {bin}", bin - 1),
-            shown(&Some([before, within])),
-            shown(&found.map(|counts| [counts[bin - 1], counts[bin]])),
+            counts_text(&Some([before, within])),
+            counts_text(&found.map(|counts| [counts[bin - 1], counts[bin]])),
         );
     }
 }

@@ -68,7 +68,7 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
             .uneven()
             .map_or("a law".to_owned(), |why| why.to_string());
         let what = "LOCAL_STOP by COUNTER_INIT";
-        checks.that(what, "a law", uneven, law.uneven().is_none());
+        checks.add_verdict(what, "a law", uneven, law.uneven().is_none());
     }
     figure_54(&bench, waves, checks)?;
     every_start_value(&bench, checks);
@@ -202,7 +202,7 @@ impl Bench {
                 let last = found.iter().copied().max();
                 let fits = !found.is_empty() && found.iter().all(|&t| edge < t && t <= expected);
                 let last = last.map_or("never".to_owned(), |last| last.to_string());
-                checks.that(what, format!("at most {expected}"), last, fits);
+                checks.add_verdict(what, format!("at most {expected}"), last, fits);
             }
         }
     }
@@ -318,10 +318,10 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         );
         let is_new = found.0 != found.1 && found.1 == Some(value);
         let what = format!("MEMORY, clk-to-Q after MEMORY_LOAD rises with {value}");
-        checks.that(what, value, shown(found.1), is_new);
+        checks.add_verdict(what, value, number_text(found.1), is_new);
         let what = format!("COUNTER_OUT follows it to {value} without COUNTER_CLK");
         let found = recorder.number_at(counter_out, after + timing.stop_to_reset);
-        checks.equal(what, shown(Some(value)), shown(found));
+        checks.equal(what, number_text(Some(value)), number_text(found));
     }
     let local_stops = recorder.rising_edges(bench.local_stop);
     let falls = recorder.falling_edges(bench.local_stop);
@@ -352,7 +352,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         if let Some([_, counter_out]) = &bench.inner {
             let found = recorder.number_at(counter_out, in_reset);
             let what = format!("cycle {cycle}: COUNTER_OUT when COUNTER_RESET falls");
-            checks.equal(what, shown(Some(start)), shown(found));
+            checks.equal(what, number_text(Some(start)), number_text(found));
 
             // Every count is read half a period after its edge, when the ripple is over.
             let mut model = p_counter::PCounterModel::new(&bench.config, start as u16);
@@ -429,7 +429,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let fallen_since = falls.iter().filter(|&&t| t > last_rise).count();
     let quiet = recorder.falling_edges(bench.clk);
     let quiet = quiet.iter().filter(|&&t| t > last_rise).count();
-    checks.that(
+    checks.add_verdict(
         "CLK periods without STOP for which LOCAL_STOP stays high",
         format!("at least {hold_periods}"),
         quiet,
@@ -536,7 +536,7 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     let off = (worst - PUBLISHED).as_s() / PUBLISHED.as_s();
     let default = SensorConfig::default();
     if (config.counter_bits, config.corner) == (default.counter_bits, default.corner) {
-        checks.that(
+        checks.add_verdict(
             "worst ripple against the published one (4.6, Fig. 56)",
             format!("{PUBLISHED} within 1 %"),
             format!("{worst}, {:+.2} %", 100.0 * off),
@@ -557,7 +557,7 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     };
     let settled = cycles.iter().map(|&(_, stop)| last_change(stop)).max();
     let settled = settled.unwrap_or(Time::MAX);
-    checks.that(
+    checks.add_verdict(
         "latest change of COUNTER_OUT by a reset, after STOP",
         format!(
             "before {}, COUNTER_RESET's fall",
@@ -569,11 +569,11 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
 }
 
 /// A number, or X.
-fn shown(number: Option<u64>) -> String {
+fn number_text(number: Option<u64>) -> String {
     number.map_or("X".to_owned(), |n| n.to_string())
 }
 
 /// Numbers in a row.
 fn sequence(numbers: impl Iterator<Item = Option<u64>>) -> String {
-    numbers.map(shown).collect::<Vec<_>>().join(" ")
+    numbers.map(number_text).collect::<Vec<_>>().join(" ")
 }

@@ -107,7 +107,7 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let sum = |counts: &[u16]| counts.iter().map(|&n| u64::from(n)).sum::<u64>();
     match (counters, read) {
         (Ok(counters), Ok(read)) => {
-            checks.that(
+            checks.add_verdict(
                 "counts of the exposure",
                 "more than 0",
                 sum(counters.counts()).to_string(),
@@ -145,7 +145,7 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     );
     let last_load = recorder.rising_edges(load_clk).into_iter().next_back();
     let last_load = last_load.unwrap_or(Time::ZERO);
-    checks.that(
+    checks.add_verdict(
         "the load ends before the readout",
         "yes",
         format!("{} before it", reads[reads.len() - 1] - last_load),
@@ -180,7 +180,7 @@ fn clocks(checks: &mut Checks) {
         let expected = [config.load_bits(), order.periods()].map(|n| clock.periods(n as i64));
         let off = |a: Time, b: Time| (a - b).as_fs().abs();
         let is_exact = off(found.load, expected[0]) <= 1 && off(found.read, expected[1]) <= 1;
-        checks.that(
+        checks.add_verdict(
             format!("4 x 8, one pin, {mhz} MHz: load and readout, us"),
             "all right, a period a bit",
             format!("{load:7.2} {read:7.2}"),
@@ -198,7 +198,7 @@ fn whole_array(checks: &mut Checks) {
     for mhz in CLOCKS_MHZ {
         let found = netlists.run_at(mhz, &config, &counts);
         let (load, read) = (found.load.as_s() * 1e6, found.read.as_s() * 1e6);
-        checks.that(
+        checks.add_verdict(
             format!("64 x 64, {pins} pins, {mhz} MHz: load and readout, us (4.7)"),
             "all right, load shorter",
             format!("{load:7.2} {read:7.2}"),
@@ -213,7 +213,7 @@ fn whole_array(checks: &mut Checks) {
         config.readout_time() < config.load_time()
     });
     let bits = config.histogram_bits() as f64 / config.load_bits() as f64;
-    checks.that(
+    checks.add_verdict(
         "pins from which on a load outlasts the readout at the same clock",
         format!("more than {bits:.1}, the ratio of bits"),
         least.map_or("none".to_owned(), |pins| pins.to_string()),

@@ -226,7 +226,7 @@ fn expected(is_late: bool) -> Vec<Option<u64>> {
         .collect()
 }
 
-fn shown<T: Debug>(counts: &[Option<T>]) -> String {
+fn counts_text<T: Debug>(counts: &[Option<T>]) -> String {
     let count = |c: &Option<T>| c.as_ref().map_or("X".to_owned(), |n| format!("{n:?}"));
     counts.iter().map(count).collect::<Vec<_>>().join(" ")
 }
@@ -239,8 +239,8 @@ fn far_from_the_crossing(checks: &mut Checks) {
         for (pixel, captured) in found.pixels.iter().enumerate() {
             checks.equal(
                 format!("{mhz} MHz, {}: counts", array::pixel_name(0, pixel)),
-                shown(&expected(is_late)),
-                shown(&captured.counts),
+                counts_text(&expected(is_late)),
+                counts_text(&captured.counts),
             );
         }
         checks.equal(format!("{mhz} MHz: violations"), 0, found.report.violated());
@@ -268,11 +268,11 @@ fn crossing(checks: &mut Checks) {
     );
     checks.equal(
         "1 ps below it: counts, all moved by one bin",
-        shown(&expected(true)),
-        shown(&counts(found - Time::from_ps(1))),
+        counts_text(&expected(true)),
+        counts_text(&counts(found - Time::from_ps(1))),
     );
     let in_band = outcome(found + Time::from_ps(1), Policy::ReportOnly);
-    checks.that(
+    checks.add_verdict(
         "1 ps above it: hold violations that an ideal flip-flop hides",
         "some",
         in_band.violations(0),
@@ -281,7 +281,7 @@ fn crossing(checks: &mut Checks) {
 }
 
 /// Which HITs of the second macropixel see SHIFT before it changes, at a period between them.
-fn between() -> (Time, Vec<bool>) {
+fn hits_between() -> (Time, Vec<bool>) {
     let silicon = Silicon {
         mismatch: Some(MISMATCH),
         ..Silicon::nominal(Corner::Typ)
@@ -302,7 +302,7 @@ fn between() -> (Time, Vec<bool>) {
 
 /// At the crossing itself: with ideal flip-flops, and with flip-flops that go unknown.
 fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    let (period, sees_old) = between();
+    let (period, sees_old) = hits_between();
     let bins = bins();
     let look = |stop: &dyn Fn(i64) -> Time| view(stop, period, &sees_old);
     let found = expose(period, Policy::ReportOnly, Some(waves), look)?;
@@ -314,8 +314,8 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
         .collect();
     checks.equal(
         format!("{period}, mp_r0_c1: counts, by which HIT sees the old SHIFT"),
-        shown(&predicted),
-        shown(&found.pixels[1].counts),
+        counts_text(&predicted),
+        counts_text(&found.pixels[1].counts),
     );
     // A photon of bin b is in HIT b before the change and in HIT b − 1 after it.
     let left = |&bin: &usize| sees_old[bin] as usize + (bin > 0 && !sees_old[bin - 1]) as usize;
@@ -323,10 +323,10 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
     for (hits, what) in [(0, "lost"), (2, "doubled")] {
         let (expected, found) = (with(hits), found.pixels[1].hits[hits]);
         let what = format!("{period}, mp_r0_c1: photons {what}, of {}", bins.len());
-        checks.that(what, expected, found, expected == found && found > 0);
+        checks.add_verdict(what, expected, found, expected == found && found > 0);
     }
     let violated = found.violations(1);
-    checks.that(
+    checks.add_verdict(
         format!("{period}, mp_r0_c1: HIT flip-flops that broke setup or hold"),
         "one or two a photon",
         violated,
@@ -347,8 +347,8 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
     );
     checks.equal(
         format!("{period}, mp_r0_c1, checks x: counts"),
-        shown::<u64>(&vec![None; config().bins]),
-        shown(&captured.counts),
+        counts_text::<u64>(&vec![None; config().bins]),
+        counts_text(&captured.counts),
     );
     Ok(())
 }

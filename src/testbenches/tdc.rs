@@ -15,7 +15,7 @@ mod waveform;
 
 use std::path::Path;
 
-use self::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
+use self::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, build};
 use crate::analysis::Linearity;
 use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
 use crate::files::InputError;
@@ -72,7 +72,7 @@ struct Tdc {
 }
 
 fn clocked() -> Tdc {
-    let (netlist, timing) = made(&clock_counter::circuit(BITS), SIGMA, 1);
+    let (netlist, timing) = build(&clock_counter::circuit(BITS), SIGMA, 1);
     let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
     Tdc {
         name: "clock counter",
@@ -88,7 +88,7 @@ fn clocked() -> Tdc {
 }
 
 fn ring() -> Tdc {
-    let (netlist, timing) = made(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
+    let (netlist, timing) = build(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
     let model = ring_oscillator::RingOscillatorModel::from_netlist(&netlist, &timing, "");
     Tdc {
         name: "ring oscillator",
@@ -104,7 +104,7 @@ fn ring() -> Tdc {
 }
 
 fn line() -> Tdc {
-    let (netlist, timing) = made(&delay_line::circuit(CODES), SIGMA, 1);
+    let (netlist, timing) = build(&delay_line::circuit(CODES), SIGMA, 1);
     let steps = delay_line::model(&netlist, &timing, "");
     Tdc {
         name: "delay line",
@@ -295,7 +295,7 @@ fn compare(tdc: &Tdc, density: &Density, checks: &mut Checks) {
     let (worst, code) = sigmas
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .expect("there are codes");
-    checks.that(
+    checks.add_verdict(
         format!("{}: DNL of every code against its delays", tdc.name),
         "within 5 standard errors",
         format!("{worst:.1} at code {code}"),
@@ -304,7 +304,7 @@ fn compare(tdc: &Tdc, density: &Density, checks: &mut Checks) {
     let total: f64 = density.counts.iter().sum();
     let share = density.linearity.step / total * tdc.range.as_s();
     let off = share / expected.step - 1.0;
-    checks.that(
+    checks.add_verdict(
         format!("{}: mean step", tdc.name),
         format!("{:.2} ps", expected.step * 1e12),
         format!("{:.2} ps", share * 1e12),

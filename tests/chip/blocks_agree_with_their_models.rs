@@ -456,7 +456,7 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
                         time: now,
                         net,
                         mask: u64::MAX,
-                        values: Lanes::known(values),
+                        values: Lanes::from_bits(values),
                     })
                     .collect();
                 now += step;
@@ -473,7 +473,7 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
                 });
                 assert_eq!(
                     kernel.value(event),
-                    Lanes::known(expected),
+                    Lanes::from_bits(expected),
                     "{upper:#x} {event_type:?} {t}"
                 );
                 compared += 64;

@@ -56,7 +56,7 @@ pub(super) fn brief(
             frame.exposure_time
         ),
     );
-    table.push("laser", judged(settings, frame));
+    table.push("laser", eye_safety_text(settings, frame));
     table.push("timing of the chip", timing_of(settings, timing));
     probes(&mut table, args, frame);
     table.push("run time", format!("{:.2} s", frame.times.total_s()));
@@ -108,7 +108,7 @@ fn files(table: &mut Table, args: &FrameArgs, frame: &Frame) {
 }
 
 /// How far the laser is from the limit of class 1.
-fn judged(settings: &FrameSettings, frame: &Frame) -> String {
+fn eye_safety_text(settings: &FrameSettings, frame: &Frame) -> String {
     match safety(settings, frame) {
         None => "not judged at this wavelength".to_owned(),
         Some(EyeSafety { times_class_1, .. }) if times_class_1 > 1.0 => {

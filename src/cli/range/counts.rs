@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::args::RangeArgs;
 use super::crosstalk;
-use super::detector::{described_detector, description, within};
-use super::returns::{shown, write_further, write_further_head};
+use super::detector::{check_within, described_detector, description};
+use super::returns::{number_text, write_further, write_further_head};
 use crate::cli::voice::{note, say_json, say_unless_quiet};
 use crate::files::{HistogramFormat, InputError, OutputFile, ZoneCounts, ZoneHistograms};
 use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
@@ -48,7 +48,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         ..default
     };
     if let Some(per_unit) = args.counts_per_unit {
-        within("--counts-per-unit", per_unit, (1e-9, 1e9))?;
+        check_within("--counts-per-unit", per_unit, (1e-9, 1e9))?;
     }
     let kept = args.bins.as_deref().map(bins).transpose()?;
     let described = description(args)?;
@@ -252,13 +252,13 @@ fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
                 "{},{},{},{},{},{},{},{},{}",
                 zone.capture,
                 zone.zone,
-                shown(first.map(|of| of.depth_m)),
-                shown(first.and_then(|of| of.bound_m)),
-                shown(first.and_then(|of| of.spread_m)),
-                shown(first.map(|of| of.photons)),
-                shown(first.map(|of| of.confidence)),
+                number_text(first.map(|of| of.depth_m)),
+                number_text(first.and_then(|of| of.bound_m)),
+                number_text(first.and_then(|of| of.spread_m)),
+                number_text(first.map(|of| of.photons)),
+                number_text(first.map(|of| of.confidence)),
                 zone.no_depth.map_or(String::new(), |why| why.to_string()),
-                shown(zone.sensor_m),
+                number_text(zone.sensor_m),
             )?;
             let returns = &zone.returns;
             write_further(out, |n| {

@@ -69,7 +69,7 @@ pub(super) fn described_detector(
 ///
 /// # Errors
 /// That it is not.
-pub(super) fn within(
+pub(super) fn check_within(
     option: &str,
     value: f64,
     (least, most): (f64, f64),

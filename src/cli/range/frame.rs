@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::RangeArgs;
-use super::returns::{shown, write_further, write_further_head};
+use super::returns::{number_text, write_further, write_further_head};
 use crate::cli::quality;
 use crate::cli::voice::{say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, read_counts};
@@ -83,13 +83,13 @@ fn write_csv(path: &Path, cols: usize, ranged: &ArrayDepths) -> anyhow::Result<(
                 at / cols,
                 at % cols,
                 pixel.start.map_or(String::new(), |s| s.to_string()),
-                shown(pixel.true_m),
-                shown(pixel.guide_m),
-                shown(pixel.measured_m),
-                shown(pixel.bound_m),
-                shown(pixel.spread_m),
-                shown(pixel.returns.get(0).map(|first| first.photons)),
-                shown(pixel.confidence),
+                number_text(pixel.true_m),
+                number_text(pixel.guide_m),
+                number_text(pixel.measured_m),
+                number_text(pixel.bound_m),
+                number_text(pixel.spread_m),
+                number_text(pixel.returns.get(0).map(|first| first.photons)),
+                number_text(pixel.confidence),
                 pixel.no_depth.map_or("", |why| why.name()),
             )?;
             write_further(out, |n| {

@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::args::{Fit, RangeArgs};
-use super::returns::shown;
+use super::returns::number_text;
 use crate::cli::voice::{say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
@@ -267,8 +267,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
             writeln!(out, "capture,zone,true_m,depth_m,sensor_m")?;
             for s in &reported {
                 let (capture, zone) = (captures[s.capture].capture, s.echo.zone);
-                let (true_m, depth_m) = (shown(s.true_m), depth(s));
-                let sensor_m = shown(s.sensor_m);
+                let (true_m, depth_m) = (number_text(s.true_m), depth(s));
+                let sensor_m = number_text(s.sensor_m);
                 writeln!(out, "{capture},{zone},{true_m},{depth_m:.6},{sensor_m}")?;
             }
             Ok(())

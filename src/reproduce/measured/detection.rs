@@ -25,11 +25,11 @@ const DAYLIGHT_HZ: f64 = 20e6;
 /// Configurations that no engine can run.
 pub fn detected(trial: &Trial, frames: usize, seed: u64) -> Result<Estimate, EngineError> {
     let histograms = trial.histograms(trial.affordable(frames), seed, |_| 0.0)?;
-    Ok(judged(trial, &histograms, trial.ties_by_lot))
+    Ok(detection_share(trial, &histograms, trial.ties_by_lot))
 }
 
 /// P_D in some histograms. By lot, a tie of k bins is found one time in k.
-pub(super) fn judged(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Estimate {
+pub(super) fn detection_share(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Estimate {
     let echo = trial.echo_bins.round() as usize;
     let won = |counts: &Vec<u32>| {
         let most = counts.iter().max().expect("a bin");
@@ -205,23 +205,23 @@ pub fn attributions(frames: usize) -> Result<Vec<Attribution>, EngineError> {
         let seed = 100 + number as u64;
         let histograms = trial.histograms(trial.affordable(frames), seed, |_| 0.0)?;
         let mut without = [None; 6];
-        let is_long = trial.without(Effect::Overflow).is_some();
+        let is_long = trial.without_effect(Effect::Overflow).is_some();
         for (effect, without) in Effect::ALL.into_iter().zip(&mut without) {
             let is_slow = is_long && matches!(effect, Effect::DeadTime | Effect::OneHit);
             if is_slow {
                 continue;
             } else if effect == Effect::Ties {
-                *without = Some(judged(&trial, &histograms, true));
-            } else if let Some(trial) = trial.without(effect) {
+                *without = Some(detection_share(&trial, &histograms, true));
+            } else if let Some(trial) = trial.without_effect(effect) {
                 *without = Some(detected(&trial, frames, seed)?);
             }
         }
         let control = trial.in_thin_light();
-        let control = control.without(Effect::Spread).unwrap_or(control);
+        let control = control.without_effect(Effect::Spread).unwrap_or(control);
         Ok(Attribution {
             name,
             formula: by_formula(&trial.per_cycle(), trial.cycles, EQ_17),
-            chip: judged(&trial, &histograms, false),
+            chip: detection_share(&trial, &histograms, false),
             without,
             control: detected(&control, frames, seed)?,
             trial,

@@ -222,7 +222,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
         let mut cells = vec![name.to_owned(), format!("{:.4}", by_formula(&trial).1)];
         cells.extend(texts(measure(&trial)?));
         for effect in effects {
-            match trial.without(effect) {
+            match trial.without_effect(effect) {
                 Some(trial) => cells.extend(texts(measure(&trial)?)),
                 None => cells.extend(["-".to_owned(), "-".to_owned()]),
             }

@@ -201,7 +201,7 @@ impl Trial {
     }
 
     /// The same without `effect`; `None` where it plays no part.
-    pub(crate) fn without(&self, effect: Effect) -> Option<Self> {
+    pub(crate) fn without_effect(&self, effect: Effect) -> Option<Self> {
         let mut trial = self.clone();
         match effect {
             Effect::Spread => {
@@ -233,7 +233,7 @@ impl Trial {
 
     /// The same photons spread over enough laser cycles that two never meet, with counters that can hold them.
     pub fn in_thin_light(&self) -> Self {
-        let thin = self.without(Effect::Threshold);
+        let thin = self.without_effect(Effect::Threshold);
         Trial {
             signal: self.signal / f64::from(THINNING),
             background_hz: self.background_hz / f64::from(THINNING),

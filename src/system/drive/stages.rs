@@ -10,7 +10,7 @@ use crate::guide::{GuideInput, GuideMap};
 use crate::scene::DVec3;
 use crate::system::error::FrameError;
 use crate::system::frame::{check_not_stopped, load_starts};
-use crate::system::light::{lit, photon_stream, starts_of};
+use crate::system::light::{lit_pixels, photon_stream, starts_of};
 use crate::system::pixel::PixelDepth;
 use crate::system::ranger::PixelContext;
 use crate::system::settings::FrameSettings;
@@ -124,7 +124,7 @@ impl DriveSimulation<'_> {
                 (truth, each, LastWorld::new(&worlds, truths, lights))
             }
         };
-        let pixels = lit(sensor, &plan.wanted, &each);
+        let pixels = lit_pixels(sensor, &plan.wanted, &each);
         spent.run.light_s = clock.lap();
         ExposureLight {
             stream,

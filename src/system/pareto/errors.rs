@@ -23,7 +23,7 @@ pub struct Errors {
 
 impl Errors {
     /// Of a cell's macropixels `pixels`: `found`, its counts times `scale`, against `exact`.
-    pub(super) fn between(
+    pub(super) fn compare(
         law: &WindowLaw,
         pixels: &[LitPixel],
         found: &ExposureResult,

@@ -30,7 +30,7 @@ fn map(estimates: &[Option<(f64, f64)>]) -> GuideMap {
 }
 
 /// What a sensor that finds every target in its window would measure.
-fn seen(
+fn measured_depths(
     pointing: &Pointing<'_>,
     starts: &[Option<u16>],
     truth_m: &[Option<f64>],
@@ -57,7 +57,7 @@ fn exposures_until_found(
     let mut last = Vec::new();
     for exposure in 0..most {
         let starts = pointing.windows(guide, &last);
-        last = seen(&pointing, &starts, truth_m);
+        last = measured_depths(&pointing, &starts, truth_m);
         for (found, seen) in found.iter_mut().zip(&last) {
             match (*found, seen) {
                 (None, Some(_)) => *found = Some(exposure + 1),

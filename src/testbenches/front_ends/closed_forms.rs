@@ -131,7 +131,7 @@ pub(super) fn compare(points: &[RatePoint], laws: &Laws, checks: &mut Checks) {
         let beyond = errors.iter().map(|error| error.0).fold(0.0, f64::max);
         let worst = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let &(_, sigmas, off, at) = worst.expect("a sweep");
-        checks.that(
+        checks.add_verdict(
             what,
             format!("within {:.0} % beyond 4 sigma", 100.0 * allowed),
             format!(
@@ -189,14 +189,14 @@ pub(super) fn folds(points: &[RatePoint], laws: &Laws, checks: &mut Checks) {
             fold / (1.0 - fold * DEAD_TIME_NS * 1e-9)
         });
         match computed {
-            Some(computed) => checks.that(
+            Some(computed) => checks.add_verdict(
                 format!("{} wire folds over at", kind.name()),
                 format!("{} M photons/s a SPAD", mega(computed)),
                 format!("{} M", mega(found)),
                 // Near its maximum a curve is flat: two steps of the sweep, 1 % of counts.
                 libm::log(found / computed).abs() <= 2.1 * libm::log(step),
             ),
-            None => checks.that(
+            None => checks.add_verdict(
                 format!("{} wire does not fold over", kind.name()),
                 format!("most from {} M on", mega(last / step.powi(2))),
                 format!("{} M", mega(found)),
@@ -205,14 +205,14 @@ pub(super) fn folds(points: &[RatePoint], laws: &Laws, checks: &mut Checks) {
         }
     }
     let summation = most(&|point| point.sampled[0]);
-    checks.that(
+    checks.add_verdict(
         "summation does not fold over",
         format!("most from {} M on", mega(last / step.powi(2))),
         format!("{} M", mega(summation)),
         summation >= last / (step.powi(2) * 1.01),
     );
     let xor = points.last().expect("a sweep").sampled[2];
-    checks.that(
+    checks.add_verdict(
         "xor_tree sampled comes to half of CLK",
         mega(0.5 * laws.clk_hz),
         mega(xor),
@@ -239,7 +239,7 @@ pub(super) fn charts(waves: &Path, points: &[RatePoint], laws: &Laws) -> Result<
     let all = f64::from(SPADS);
     let (x, y) = axes("counts of the macropixel (1/s)");
     let title = format!("Fig. 22 without a clock: {SPADS} SPADs, dead time {DEAD_TIME_NS} ns");
-    Chart::new(title, x, y.between(1e6, 1e10))
+    Chart::new(title, x, y.with_range(1e6, 1e10))
         .points("avalanches", measured(&|p| p.avalanches))
         .line("n φ / (1 + φ D)", law(&|hz| all * laws.avalanches_hz(hz)))
         .points("(a) OR tree, gates", measured(&|p| p.wires[0]))
@@ -259,7 +259,7 @@ pub(super) fn charts(waves: &Path, points: &[RatePoint], laws: &Laws) -> Result<
         mega(laws.clk_hz)
     );
     let sampled = |kind| law(&|hz| laws.sampled_hz(kind, hz).expect("it has a closed form"));
-    Chart::new(title, x, y.between(1e5, 1e10))
+    Chart::new(title, x, y.with_range(1e5, 1e10))
         .points("(d) summation, gates: SPADs", measured(&|p| p.sampled[0]))
         .line("n m", sampled(FrontEnd::Summation))
         .dashed(

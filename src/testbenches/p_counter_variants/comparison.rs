@@ -56,10 +56,10 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
     let ripple = variant_row(PCounter::Ripple);
     let synchronous = variant_row(PCounter::Synchronous);
     let segmented = variant_row(PCounter::Segmented);
-    checks.that(
+    checks.add_verdict(
         "a synchronous counter avoids the ripple's limit (4.6): shortest CLK period",
-        format!("below {}, ripple's", shown(ripple.period.0)),
-        shown(synchronous.period.0),
+        format!("below {}, ripple's", period_text(ripple.period.0)),
+        period_text(synchronous.period.0),
         synchronous.period.0 < ripple.period.0,
     );
     let nine_stages = ripple.local_stop.1 - synchronous.local_stop.1;
@@ -68,13 +68,13 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
         synchronous.local_stop.1 + Time::from_fs(nine_stages.as_fs() / 3),
         segmented.local_stop.1,
     );
-    checks.that(
+    checks.add_verdict(
         "segmented: shortest CLK period",
-        format!("below {}, ripple's", shown(ripple.period.1)),
-        shown(segmented.period.1),
+        format!("below {}, ripple's", period_text(ripple.period.1)),
+        period_text(segmented.period.1),
         segmented.period.1 < ripple.period.1,
     );
-    checks.that(
+    checks.add_verdict(
         "segmented: transistors, with timing",
         format!("below {}, a synchronous counter's", synchronous.transistors),
         segmented.transistors,
@@ -149,8 +149,8 @@ impl Row {
             per_count(self.activity.changes),
             per_count(self.activity.glitches),
             self.activity.on_local_stop.to_string(),
-            shown(self.period.0),
-            shown(self.period.1),
+            period_text(self.period.0),
+            period_text(self.period.1),
         ]
     }
 
@@ -162,7 +162,7 @@ impl Row {
             simulated,
         );
         let (by_paths, simulated) = self.settled;
-        checks.that(
+        checks.add_verdict(
             format!("{name}: everything settled after a count, all counts"),
             format!("at most {by_paths}, the longest path"),
             simulated,
@@ -174,7 +174,7 @@ impl Row {
         );
         checks.equal(what, 0, self.activity.on_local_stop);
         if let Some(on_equal) = self.activity.on_equal {
-            checks.that(
+            checks.add_verdict(
                 format!(
                     "{name}: changes of EQUAL that are no match, which its flip-flop must keep out"
                 ),
@@ -184,16 +184,16 @@ impl Row {
             );
         }
         let (by_paths, simulated) = self.period;
-        checks.that(
+        checks.add_verdict(
             format!("{name}: shortest CLK period of the gates"),
-            format!("at most {}, by static timing", shown(by_paths)),
-            shown(simulated),
+            format!("at most {}, by static timing", period_text(by_paths)),
+            period_text(simulated),
             by_paths.is_some() && simulated.is_some() && simulated <= by_paths,
         );
     }
 }
 
-fn shown(period: Option<Time>) -> String {
+fn period_text(period: Option<Time>) -> String {
     period.map_or("-".to_owned(), |p| p.to_string())
 }
 

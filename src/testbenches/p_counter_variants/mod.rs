@@ -373,7 +373,7 @@ fn false_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
         checks.equal(what, numbers(early), numbers(&found));
     }
     let arrival = at_reset + timing.local_stop_to_strobe;
-    checks.that(
+    checks.add_verdict(
         "the false strobe comes while the sensor's HIT is still in reset, after STOP",
         format!("before {}", timing.stop_to_hit_release),
         arrival,

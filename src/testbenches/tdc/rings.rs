@@ -11,7 +11,7 @@
 
 use std::path::Path;
 
-use super::converter::{BEGIN, BITS, SIGMA, STAGES, made};
+use super::converter::{BEGIN, BITS, SIGMA, STAGES, build};
 use crate::chip::tdc::coupling::RingRow;
 use crate::chip::tdc::ring_oscillator;
 use crate::files::InputError;
@@ -36,7 +36,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let pins: Vec<_> = pins.iter().map(|(name, net)| (*name, &net[..])).collect();
     let ring = ring_oscillator::circuit(STAGES, BITS);
     (0..RINGS).for_each(|pixel| m.instance(&format!("pixel_{pixel}"), &ring, &pins));
-    let (netlist, timing) = made(
+    let (netlist, timing) = build(
         &m.finish().expect("the testbench's circuit is whole"),
         SIGMA,
         2,
@@ -110,20 +110,20 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     // The mean of one delay for each stage, each with the mismatch of its cell.
     let inverter = SIGMA / (STAGES as f64).sqrt();
     let alone = spread(&free_hz);
-    checks.that(
+    checks.add_verdict(
         "rings alone: spread of their periods, against an inverter's over the square root of the stages",
         format!("{:.1} % within a half", 100.0 * inverter),
         format!("{:.1} %", 100.0 * alone),
         (alone / inverter - 1.0).abs() < 0.5,
     );
     let [(_, loose), (_, tight)] = &coupled;
-    checks.that(
+    checks.add_verdict(
         "rings coupled by 1.1 of the least pull share one frequency, the mean",
         format!("{:.4} MHz", locked * 1e-6),
         format!("{:.4} MHz, spread {:.1e}", tight[0] * 1e-6, spread(tight)),
         (tight[0] / locked - 1.0).abs() < 1e-6 && spread(tight) < 1e-6,
     );
-    checks.that(
+    checks.add_verdict(
         "rings coupled by 0.3 of it do not",
         "a spread between",
         format!("{:.2} %", 100.0 * spread(loose)),

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use super::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
+use super::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, build};
 use crate::chip::tdc::{clock_counter, delay_line, ring_oscillator};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -37,7 +37,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     m.instance("clock_counter", &clock_counter::circuit(BITS), &with_clk);
     m.instance("ring", &ring_oscillator::circuit(STAGES, BITS), &pins);
     m.instance("line", &delay_line::circuit(CODES), &pins);
-    let (netlist, timing) = made(
+    let (netlist, timing) = build(
         &m.finish().expect("the testbench's circuit is whole"),
         SIGMA,
         1,
@@ -93,7 +93,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let expected = models.each_ref().map(|steps| steps.code(interval));
         let ones = found[1].map(|seen| seen.count_ones() as usize);
         let found = [found[0].map(|code| code as usize), ones];
-        checks.that(
+        checks.add_verdict(
             format!("{interval} in the waveform: codes of ring and line"),
             format!("{} and {}", expected[0], expected[1]),
             found

@@ -131,7 +131,7 @@ impl DelaySet {
     /// Delays by new value for the pins in which `inputs` and `evaluated` differ: the shortest of the arcs
     /// concerned. A flip-flop's D is no cause; `inputs` and `evaluated` must agree on it.
     #[inline]
-    pub(super) fn after(&self, inputs: u8, evaluated: u8) -> [u32; 4] {
+    pub(super) fn shortest_delays(&self, inputs: u8, evaluated: u8) -> [u32; 4] {
         let differing = inputs ^ evaluated;
         let mut pairs = (differing | differing >> 1) & 0b0101_0101;
         debug_assert!(pairs != 0, "evaluated without a cause");
@@ -285,7 +285,7 @@ mod tests {
         let set = DelaySet::all(&netlist, &timing).0[timing.set_of(0) as usize];
         let arc =
             |pin: usize| library.arcs(CellKind::Mux2)[pin][0].delay_fs(Corner::Typ, Logic::One);
-        let by_pins = |differing: u8| set.after(differing, 0)[Logic::One as usize];
+        let by_pins = |differing: u8| set.shortest_delays(differing, 0)[Logic::One as usize];
         assert_eq!(by_pins(0b00_00_01), arc(0));
         assert_eq!(by_pins(0b10_00_00), arc(2));
         assert_eq!(by_pins(0b11_01_00), arc(1).min(arc(2)));

@@ -386,7 +386,7 @@ impl LaneKernel {
             }
             left &= !alike;
             debug_assert!(pins != 0, "an output moved without a cause");
-            let delays_fs = self.delays[set as usize].after(pins, 0);
+            let delays_fs = self.delays[set as usize].shortest_delays(pins, 0);
             for (mask, to) in [
                 (value.one, Logic::One),
                 (value.zero, Logic::Zero),

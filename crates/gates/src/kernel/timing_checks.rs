@@ -298,7 +298,7 @@ impl Observer for TimingChecks {
         }
         let index = net.index();
         if self.pins.has_any(index) {
-            self.nets[index].now = value.seen();
+            self.nets[index].now = value.as_gate_input();
             self.touched.push(index as u32);
         }
     }

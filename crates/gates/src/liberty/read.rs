@@ -70,7 +70,7 @@ impl Liberty {
             let mut lines = HashMap::new();
             for cell in file.group.of_kind("cell") {
                 if let Some(&before) = lines.get(cell.name()) {
-                    passed_over.push(PassedOver::again(file, cell, before));
+                    passed_over.push(PassedOver::duplicate(file, cell, before));
                     continue;
                 }
                 lines.insert(cell.name(), cell.line);

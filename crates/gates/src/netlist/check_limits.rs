@@ -188,7 +188,7 @@ impl CheckLimits {
 
     /// The limit of one check in one corner, fs; that of setup and hold for D changing in the direction of `edge`,
     /// which the other checks ignore.
-    pub const fn toward(&self, check: CheckKind, edge: Edge, corner: Corner) -> u32 {
+    pub const fn edge_limit_fs(&self, check: CheckKind, edge: Edge, corner: Corner) -> u32 {
         let limit = match check {
             CheckKind::Setup => self.setup.for_edge(edge),
             CheckKind::Hold => self.hold.for_edge(edge),
@@ -203,8 +203,8 @@ impl CheckLimits {
 
     /// The limit of one check in one corner, fs; the larger one where D's directions differ.
     pub const fn limit_fs(&self, check: CheckKind, corner: Corner) -> u32 {
-        let rise = self.toward(check, Edge::Rise, corner);
-        let fall = self.toward(check, Edge::Fall, corner);
+        let rise = self.edge_limit_fs(check, Edge::Rise, corner);
+        let fall = self.edge_limit_fs(check, Edge::Fall, corner);
         if rise > fall { rise } else { fall }
     }
 }
@@ -233,8 +233,8 @@ mod tests {
             for check in CheckKind::ALL {
                 for corner in Corner::ALL {
                     let limits = CheckLimits::for_cell(kind);
-                    let either =
-                        [Edge::Rise, Edge::Fall].map(|edge| limits.toward(check, edge, corner));
+                    let either = [Edge::Rise, Edge::Fall]
+                        .map(|edge| limits.edge_limit_fs(check, edge, corner));
                     assert_eq!(Some(&limits.limit_fs(check, corner)), either.iter().max());
                 }
             }

@@ -58,7 +58,7 @@ impl InstanceLimits {
 
     /// What the library says in one corner.
     pub(crate) fn from_library(limits: &CheckLimits, corner: Corner) -> Self {
-        let by_edge = |check| Edge::BOTH.map(|edge| limits.toward(check, edge, corner));
+        let by_edge = |check| Edge::BOTH.map(|edge| limits.edge_limit_fs(check, edge, corner));
         InstanceLimits([CheckKind::ALL.map(by_edge); 2])
     }
 

@@ -140,7 +140,7 @@ impl Annotator<'_, '_, '_> {
                 } else {
                     return self.error(
                         entry.line,
-                        match self.elsewhere(path) {
+                        match self.alternative_path(path) {
                             Some(meant) => format!(
                                 "the chip has no instance {path}, but has {meant}; give paths below its top and the right DIVIDER"
                             ),
@@ -162,7 +162,7 @@ impl Annotator<'_, '_, '_> {
     }
 
     /// The instance that a path may mean: with the other divider, or below a testbench.
-    fn elsewhere(&self, path: &str) -> Option<String> {
+    fn alternative_path(&self, path: &str) -> Option<String> {
         let dotted = path.replace("\\.", ".").replace('/', ".");
         let mut rest = Some(dotted.as_str());
         let mut below = std::iter::from_fn(|| {

@@ -45,7 +45,7 @@ impl WaveSelection {
 
     /// Only the scope at this dotted path below the top, and what is below it. Several calls add
     /// up.
-    pub fn below(mut self, path: impl Into<String>) -> Self {
+    pub fn with_scope(mut self, path: impl Into<String>) -> Self {
         self.below.push(path.into());
         self
     }
@@ -151,11 +151,16 @@ mod tests {
             ]
         );
         assert_eq!(
-            coverage(WaveSelection::all().below("b")),
+            coverage(WaveSelection::all().with_scope("b")),
             [Path, Nothing, Nothing, Nothing, Signals, Signals, Signals]
         );
         assert_eq!(
-            coverage(WaveSelection::all().below("b").below("a.y").depth(0)),
+            coverage(
+                WaveSelection::all()
+                    .with_scope("b")
+                    .with_scope("a.y")
+                    .depth(0)
+            ),
             [Path, Path, Nothing, Signals, Signals, Nothing, Nothing]
         );
     }
@@ -163,7 +168,7 @@ mod tests {
     #[test]
     fn a_path_that_leads_nowhere_is_named() {
         let error = WaveSelection::all()
-            .below("a.z")
+            .with_scope("a.z")
             .coverage(&tree())
             .unwrap_err();
         assert!(error.to_string().contains("`a.z`"), "{error}");

@@ -282,7 +282,7 @@ $end
 
     #[test]
     fn a_selection_keeps_paths() {
-        let text = writer(WaveSelection::all().below("second"));
+        let text = writer(WaveSelection::all().with_scope("second"));
         let text = String::from_utf8(text.finish(Time::ZERO).unwrap()).unwrap();
         let expected = "$scope module pair $end
 $scope module second $end
@@ -341,7 +341,7 @@ $upscope $end
     #[test]
     fn changes_of_nets_not_selected_cost_no_line() {
         let changes = [(5, "A", One), (6, "Z[1]", One)];
-        let only = writer(WaveSelection::all().below("second"));
+        let only = writer(WaveSelection::all().with_scope("second"));
         assert_eq!(body(only, changes), "#6\n1\"\n#100\n");
     }
 

@@ -146,7 +146,7 @@ fn latched(state: Logic, [data, clock, reset, set]: [Logic; 4], clock_before: Lo
             .into_iter()
             .flat_map(|b| may_be(clock).into_iter().map(move |n| (b, n)))
         {
-            let rises = clock.seen() != clock_before.seen() && !before && now;
+            let rises = clock.as_gate_input() != clock_before.as_gate_input() && !before && now;
             let clocked = if rises { data } else { state };
             let values = match (reset, set) {
                 (true, _) => vec![false],
@@ -163,7 +163,7 @@ fn latched(state: Logic, [data, clock, reset, set]: [Logic; 4], clock_before: Lo
 }
 
 /// Pulses of each net that are shorter than its driver's delay: each cell by itself, from the waves at its pins.
-fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64> {
+fn inertial_glitches(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64> {
     let mut pulses = vec![0; of_net.len()];
     for (index, cell) in netlist.cells().iter().enumerate() {
         let pins: Vec<NetId> = cell.input_nets().collect();
@@ -250,7 +250,7 @@ pub fn compare(
     let inputs = netlist.inputs();
     let input_changes = inputs.iter().flat_map(|input| &of_net[input.index()]);
     let input_changes = input_changes.map(|change| change.0).collect();
-    let swallowed = swallowed(netlist, timing, &of_net);
+    let swallowed = inertial_glitches(netlist, timing, &of_net);
     for (path, net, changes) in &bits {
         let row = nets.get(path);
         prop_assert!(row.is_some(), "{} is in no list", path);
@@ -269,7 +269,7 @@ pub fn saif(netlist: &Netlist, activity: &Activity, end: Time) -> String {
     write_saif(
         &mut text,
         netlist,
-        &activity.until(end),
+        &activity.net_activity(end),
         end,
         true,
         femtogate::Origin::default(),

@@ -244,7 +244,7 @@ impl ResultSet {
             .iter()
             .map(|name| ManifestFile::from_file(&self.folder, name));
         let others = others.collect::<io::Result<_>>().map_err(failed)?;
-        self.put(&switch, [files, others], previous_files, configuration)
+        self.publish(&switch, [files, others], previous_files, configuration)
             .map_err(failed)?;
         Ok(switch.sentences(&self.folder))
     }
@@ -262,7 +262,7 @@ impl ResultSet {
         names.iter().map(describe).collect()
     }
 
-    fn put(
+    fn publish(
         &self,
         switch: &Switch,
         [files, others]: [Vec<ManifestFile>; 2],

@@ -89,7 +89,7 @@ impl<'a> Avalanches<'a> {
         }
         avalanches.unknown = u64::MAX;
         for photon in breeding {
-            avalanches.breed(photon, false);
+            avalanches.queue_children(photon, false);
         }
         avalanches
             .pending
@@ -208,7 +208,7 @@ impl<'a> Avalanches<'a> {
                 self.blind_until[usize::from(spad)] = until;
             }
             if is_ready && breeds {
-                self.breed(photon, true);
+                self.queue_children(photon, true);
             }
             return Ok(());
         }
@@ -222,13 +222,13 @@ impl<'a> Avalanches<'a> {
         self.blind_until[usize::from(spad)] = before.max(time + self.dead_time_of(spad));
         self.unknown |= 1 << spad;
         if breeds {
-            self.breed(photon, false);
+            self.queue_children(photon, false);
         }
         Ok(())
     }
 
     /// Notes what an avalanche causes.
-    fn breed(&mut self, parent: Photon, is_certain: bool) {
+    fn queue_children(&mut self, parent: Photon, is_certain: bool) {
         let parent = SpadEvent::new(parent.time, parent.spad);
         let dead_time = self.dead_time_of(parent.spad);
         let children = self.model.children(self.key, self.pixel, dead_time, parent);

@@ -364,7 +364,7 @@ impl GlintGroup {
             );
             let before = glints.iter().zip(&shares);
             let exact: f64 = before.map(|(glint, share)| glint.photons * share).sum();
-            (exact / self.photons - below(z)).abs()
+            (exact / self.photons - normal_cdf(z)).abs()
         };
         (0..INSTANTS).fold(0.0, |most, n| off(n).max(most))
     }
@@ -375,13 +375,13 @@ impl GlintGroup {
 fn shares_before(time_fs: f64, arrivals_fs: &[f64], sigmas_fs: &[f64], shares: &mut [f64]) {
     let pulses = arrivals_fs.iter().zip(sigmas_fs);
     for (share, (arrival_fs, sigma_fs)) in shares.iter_mut().zip(pulses) {
-        *share = below((time_fs - arrival_fs) / sigma_fs);
+        *share = normal_cdf((time_fs - arrival_fs) / sigma_fs);
     }
 }
 
 /// The standard normal distribution function.
 #[inline(always)]
-fn below(z: f64) -> f64 {
+fn normal_cdf(z: f64) -> f64 {
     let tail = branchless::normal_above(z.abs());
     if z > 0.0 { 1.0 - tail } else { tail }
 }

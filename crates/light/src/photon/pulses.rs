@@ -92,7 +92,7 @@ impl PhotonStream {
                         Photon::new(
                             start + Time::from_fs(photon >> SPAD_SHIFT),
                             (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
-                            light.breeds(),
+                            light.has_secondaries(),
                         )
                     }));
                 }
@@ -174,7 +174,7 @@ impl PhotonStream {
             later.retain(|photon| photon.time < end);
             drawn += photons.len() as u64;
             edges.clear();
-            if are_apart && rows.put(&parts[0], &photons, from, until) {
+            if are_apart && rows.sort_in(&parts[0], &photons, from, until) {
                 avalanches.run_rows(&rows, &parts[0], from, &mut edges);
             } else {
                 sort_photons(&mut photons, from, &mut keys);

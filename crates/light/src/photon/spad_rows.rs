@@ -8,7 +8,7 @@
 //!
 //! Photons are counted by SPAD and row, and put where their row begins. A row that a SPAD is blind for is not looked at. Where photons prolong blindness, or
 //! the SPAD's state is not known yet, only the first and the last photon of a row matter. The results are those of
-//! [`Avalanches::run`](super::Avalanches::run).
+//! [`Avalanches::append_edges`](super::Avalanches::append_edges).
 
 use super::spad::{DeadTimeLaw, Photon, SpadEvent, Unknown};
 use super::stream::PixelStream;
@@ -28,7 +28,7 @@ pub struct SpadRows {
 impl SpadRows {
     /// Sorts `photons` in, none of which comes before `from` or from `until` on. False, and nothing done, where there are far fewer photons than rows of
     /// all SPADs: then a sort takes less time.
-    pub fn put(
+    pub fn sort_in(
         &mut self,
         light: &PixelStream<'_>,
         photons: &[Photon],
@@ -219,7 +219,7 @@ mod tests {
             let mut photons: Vec<Photon> = photons.filter(|photon| !knows_all || photon.time >= from).collect();
             let known: Vec<Photon> = photons.iter().copied().filter(|photon| photon.time >= from).collect();
             let mut rows = SpadRows::default();
-            prop_assume!(rows.put(&parts[0], &known, from, until));
+            prop_assume!(rows.sort_in(&parts[0], &known, from, until));
             let mut found = Vec::new();
             let mut blind_until = [Time::from_fs(from_fs - 1); 4];
             let before = knows_all.then_some(&mut blind_until[..]);

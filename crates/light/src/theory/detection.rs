@@ -146,7 +146,7 @@ pub(crate) fn compare(signal: &Counts, background: &Counts, bins: u32, ties: Tie
     (hit, miss) = (hit * stride as f64, miss * stride as f64);
     if hit < miss {
         // No background bin reaches beyond the grid; the signal bin may.
-        hit += signal.above(first + (tails.at.len() as u64 - 1) * stride);
+        hit += signal.tail_above(first + (tails.at.len() as u64 - 1) * stride);
     }
     Detection::new(hit, miss)
 }

@@ -129,7 +129,7 @@ impl Cost {
 /// The greatest mean of a Poisson count that exceeds a counter of `bin_bits` with no more than `chance`.
 pub fn largest_mean(bin_bits: u32, chance: f64) -> f64 {
     let capacity = (1u64 << bin_bits) - 1;
-    let overflows = |mean: f64| Counts::poisson(mean, 0.0).above(capacity) > chance;
+    let overflows = |mean: f64| Counts::poisson(mean, 0.0).tail_above(capacity) > chance;
     let (mut low, mut high) = (0.0, capacity as f64);
     if !overflows(high) {
         return high;
@@ -350,7 +350,7 @@ mod tests {
         for bits in [1, 8, 12, 14] {
             let mean = largest_mean(bits, 0.003);
             let capacity = (1u64 << bits) - 1;
-            let chance = |mean: f64| Counts::poisson(mean, 0.0).above(capacity);
+            let chance = |mean: f64| Counts::poisson(mean, 0.0).tail_above(capacity);
             assert!(
                 chance(mean) <= 0.003 && chance(mean * 1.001) > 0.003,
                 "{bits}: {mean}"

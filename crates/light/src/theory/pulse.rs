@@ -60,7 +60,7 @@ impl Pulse {
         match self {
             Pulse::Gaussian { sigma_ns } => gaussian_bin(*sigma_ns, from_ns, to_ns),
             Pulse::Measured(pulse) => LnBin {
-                share: log((pulse.below(to_ns) - pulse.below(from_ns)).max(0.0)),
+                share: log((pulse.cumulative(to_ns) - pulse.cumulative(from_ns)).max(0.0)),
                 slope: log((pulse.density(from_ns) - pulse.density(to_ns)).abs()),
             },
         }
@@ -192,7 +192,7 @@ impl MeasuredPulse {
         })
     }
 
-    fn below(&self, t_ns: f64) -> f64 {
+    fn cumulative(&self, t_ns: f64) -> f64 {
         match self.locate(t_ns) {
             Some((i, x)) => {
                 let here = self.density[i] + 0.5 * x * (self.density[i + 1] - self.density[i]);

@@ -198,7 +198,7 @@ fn at_least(least: u64, cells: u64, chance: f64) -> f64 {
         cycles: cells,
         photons_per_cycle: -libm::log1p(-chance),
     };
-    counts.above(least - 1)
+    counts.tail_above(least - 1)
 }
 
 /// Share of a pulse in the best of all stretches of `width` bins, averaged over where it lies, over √width.

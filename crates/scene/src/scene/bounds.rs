@@ -32,7 +32,7 @@ pub(crate) struct Cone {
 
 impl Cone {
     /// About the direction `middle`, so wide that `others` are in it, unit vectors all.
-    pub(super) fn about(middle: DVec3, others: impl IntoIterator<Item = DVec3>) -> Self {
+    pub(super) fn enclosing(middle: DVec3, others: impl IntoIterator<Item = DVec3>) -> Self {
         let cosines = others.into_iter().map(|other| other.dot(middle));
         let half_rad = libm::acos(cosines.fold(1.0, f64::min)) + ROOM_RAD;
         Cone {
@@ -84,14 +84,14 @@ impl Bounds {
     /// Objects that `rays` from the place may meet; none of them may look backwards from another.
     pub(crate) fn of_rays(&self, rays: &[Ray]) -> Candidates {
         let sum: DVec3 = rays.iter().map(|ray| ray.direction).sum();
-        self.about(Cone::about(
+        self.candidates(Cone::enclosing(
             sum.normalize(),
             rays.iter().map(|ray| ray.direction),
         ))
     }
 
     /// Objects that rays from the place within a cone may meet.
-    pub(super) fn about(&self, cone: Cone) -> Candidates {
+    pub(super) fn candidates(&self, cone: Cone) -> Candidates {
         let (sine, cosine) = cone.sine_cosine;
         let may_meet = |disc: &Option<Disc>| {
             disc.is_none_or(|disc| {
@@ -219,7 +219,7 @@ mod tests {
                 };
                 let middle = ray_direction(0.5, 0.5);
                 let corners = [ray_direction(0.0, 0.0), ray_direction(0.0, 1.0), ray_direction(1.0, 0.0), ray_direction(1.0, 1.0)];
-                let candidates = bounds.about(Cone::about(middle, corners));
+                let candidates = bounds.candidates(Cone::enclosing(middle, corners));
                 for direction in corners.into_iter().chain([middle, ray_direction(0.2, 0.9)]) {
                     let ray = Ray::new(DVec3::ZERO, direction);
                     prop_assert_eq!(scene.returns(&ray), stage.returns_of(&ray, &candidates));
@@ -241,7 +241,7 @@ mod tests {
             let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)];
             let corners =
                 corners.map(|(u, v)| camera.at_unit_depth((col + u, row + v)).normalize());
-            let candidates = bounds.about(Cone::about(middle, corners));
+            let candidates = bounds.candidates(Cone::enclosing(middle, corners));
             let seen = truth.surfaces[pixel as usize].iter();
             for surface in seen {
                 assert!(candidates.contains(&(surface.object as u32)));

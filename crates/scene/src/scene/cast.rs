@@ -170,7 +170,7 @@ impl<'a> Stage<'a> {
         let mut opaque = self.opaque(self.all());
         opaque.any(|n| {
             self.balls[n].is_none_or(|ball| may_be_met(ball, ray))
-                && self.placed[n].meet(ray).is_some()
+                && self.placed[n].intersect(ray).is_some()
         })
     }
 
@@ -232,12 +232,12 @@ impl<'a> Stage<'a> {
         let mut hit = self.seen_at(ray, (meeting, index));
         let object = &self.scene.objects[index];
         let point = ray.point(hit.range_m);
-        let bundle = way.bundle.map(|bundle| bundle.after(hit.range_m));
+        let bundle = way.bundle.map(|bundle| bundle.advanced(hit.range_m));
         hit.range_m += so_far_m;
         if hit.reflectivity > 0.0 || hit.grey > 0.0 || object.ends_rays() {
             let (facing, kept) = match &bundle {
                 None => (hit.normal, 1.0),
-                Some(bundle) => bundle.onto(ray.direction, hit.normal, hit.range_m),
+                Some(bundle) => bundle.facing_and_share(ray.direction, hit.normal, hit.range_m),
             };
             returns.surfaces.push(SurfaceReturn {
                 hit,
@@ -277,7 +277,7 @@ impl<'a> Stage<'a> {
         }
         if let Some(share) = thrown {
             let reflected = Ray::new(point, reflected(ray.direction, hit.normal));
-            let bundle = bundle.unwrap_or_else(|| Bundle::new(ray.direction).after(so_far_m));
+            let bundle = bundle.unwrap_or_else(|| Bundle::new(ray.direction).advanced(so_far_m));
             let placed = &self.placed[index];
             let outward = placed.normal_at(point, meeting.part);
             let bend = |step_m| placed.bend(meeting.part, step_m);
@@ -311,7 +311,7 @@ impl<'a> Stage<'a> {
     fn first_meeting(&self, ray: &Ray, objects: impl Iterator<Item = usize>) -> First {
         let mut nearest: First = None;
         for index in objects {
-            if let Some(meeting) = self.placed[index].meet(ray)
+            if let Some(meeting) = self.placed[index].intersect(ray)
                 && nearest.is_none_or(|(least, _)| meeting.range_m < least.range_m)
             {
                 nearest = Some((meeting, index));

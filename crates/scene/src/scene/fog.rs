@@ -61,7 +61,7 @@ impl Fog {
 
     /// Adds it to the light of a macropixel whose rays end there. `centre_fs` is when the centre of the laser pulse comes in its own
     /// time, `sigma` the standard deviation of its Gaussian part, `gain` what the macropixel gets relative to one on the axis.
-    pub(super) fn onto(
+    pub(super) fn add_to(
         &self,
         mut light: PixelLight,
         ends: &Ends,
@@ -180,7 +180,7 @@ mod tests {
         let fog = Fog::from_scene(&scene, &budget).unwrap();
         let sigma = scene.pulse_sigma();
         let dim = PixelLight::background(1e6);
-        let light = fog.onto(dim, &[(60.0, 1.0)], 1.0, sigma, 0.0);
+        let light = fog.add_to(dim, &[(60.0, 1.0)], 1.0, sigma, 0.0);
         let segment = light.segments().next().unwrap();
         let profile = segment.profile.as_ref().unwrap();
         let below = |z: f64| 0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2);

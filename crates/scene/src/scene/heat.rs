@@ -109,7 +109,7 @@ impl Lidar {
             }
         };
         let line = Filter::new(nm, fwhm_nm, FilterShape::Gaussian);
-        self.through(breaks, line)
+        self.passed_share(breaks, line)
     }
 
     /// Detected photons of a joule of light at `nm`, relative to those of the laser's own light: by the filter, the detection efficiency
@@ -120,7 +120,7 @@ impl Lidar {
     }
 
     /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
-    fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
+    fn passed_share(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
         breaks.extend((-12..=12).map(|k| line.centre_nm + f64::from(k) * 0.25 * line.fwhm_nm));
         let reach_nm = 3.0 * line.fwhm_nm;
         breaks.retain(|nm| (nm - line.centre_nm).abs() <= reach_nm);

@@ -110,7 +110,7 @@ impl Scene {
         }
         let own = |(pixel, light): (usize, PixelLight)| {
             let spread = self.spad_spread(pixel as u32, layout.spads());
-            let lit = layout.lit(light, spread.as_ref());
+            let lit = layout.place_light(light, spread.as_ref());
             lit.expect("as many SPADs as the layout has")
         };
         lights.into_iter().enumerate().map(own).collect()
@@ -212,7 +212,7 @@ impl Scene {
             });
             let light = echoes.fold(background, PixelLight::with_echo);
             let light = match &fog {
-                Some(fog) => fog.onto(light, &view.ends_m, off_axis.signal, sigma, centre_fs),
+                Some(fog) => fog.add_to(light, &view.ends_m, off_axis.signal, sigma, centre_fs),
                 None => light,
             };
             let trains = falling.trains.into_iter();

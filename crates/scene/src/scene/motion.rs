@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 use super::object::Object;
-use super::rig::{Rig, along};
+use super::rig::{Rig, interpolate};
 use super::settings::Scene;
 
 impl Scene {
@@ -22,7 +22,7 @@ impl Scene {
         let (position_m, yaw_deg) = self.rig.pose(time_s);
         for object in &mut scene.objects {
             let points = object.waypoints.iter().map(|&at| at.into());
-            let displacement_m = match along(points, time_s) {
+            let displacement_m = match interpolate(points, time_s) {
                 Some([_, x, y, z]) => DVec3::new(x, y, z),
                 None => object.velocity_m_s * time_s,
             };
@@ -66,7 +66,7 @@ impl Scene {
         let way_m = |object: &Object| -> f64 {
             let places = times.iter().zip(&rig).map(|(&time_s, (rig_m, _))| {
                 let points = object.waypoints.iter().map(|&at| at.into());
-                match along(points, time_s) {
+                match interpolate(points, time_s) {
                     Some([_, x, y, z]) => DVec3::new(x, y, z) - *rig_m,
                     None => object.velocity_m_s * time_s - *rig_m,
                 }
@@ -131,11 +131,11 @@ mod tests {
             (9.0, 1.0),
         ] {
             assert_eq!(
-                along(points.into_iter(), time_s),
+                interpolate(points.into_iter(), time_s),
                 Some([time_s.clamp(1.0, 4.0), place])
             );
         }
-        assert_eq!(along(std::iter::empty::<[f64; 2]>(), 1.0), None);
+        assert_eq!(interpolate(std::iter::empty::<[f64; 2]>(), 1.0), None);
     }
 
     fn still_life() -> Scene {

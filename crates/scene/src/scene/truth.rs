@@ -62,7 +62,7 @@ impl GroundTruth {
     ) -> (Self, usize) {
         let moved = before.and_then(|before| {
             debug_assert_eq!((before.truth.rows, before.truth.cols), (rows, cols));
-            Some((Moved::between(before.world, scene)?, before.truth))
+            Some((Moved::from_worlds(before.world, scene)?, before.truth))
         });
         let camera = scene.lidar_camera(rows, cols);
         let (stage, bounds) = (Stage::new(scene), Bounds::from_scene(scene, DVec3::ZERO));

@@ -26,7 +26,7 @@ pub(super) struct Moved {
 
 impl Moved {
     /// Those from one world to another; `None` where all has to be looked at again.
-    pub(super) fn between(before: &Scene, now: &Scene) -> Option<Self> {
+    pub(super) fn from_worlds(before: &Scene, now: &Scene) -> Option<Self> {
         let has_one_look = before.lidar == now.lidar
             && before.light == now.light
             && before.medium == now.medium
@@ -50,7 +50,7 @@ impl Moved {
     /// Whether looks from the lidar within a cone meet none of them, before or now.
     pub(super) fn is_out_of_sight(&self, cone: Cone) -> bool {
         self.bounds.iter().all(|bounds| {
-            let seen = bounds.about(cone);
+            let seen = bounds.candidates(cone);
             let mut seen = seen.iter().map(|&object| object as usize);
             seen.all(|object| !self.is_moved[object] && !self.has_mirror[object])
         })
@@ -149,7 +149,7 @@ mod tests {
         let mut later = places;
         later[1].0 += 0.3;
         let [before, now] = [places, later].map(|places| room(&places, 0.0, None));
-        let moved = Moved::between(&before, &now).expect("nothing but a ball is another");
+        let moved = Moved::from_worlds(&before, &now).expect("nothing but a ball is another");
         let camera = now.lidar_camera(16, 16);
         let cones = (0..16).flat_map(|row| (0..16).map(move |col| (row, col)));
         let kept =
@@ -157,8 +157,8 @@ mod tests {
         let kept = kept.count();
         assert!((150..256).contains(&kept), "{kept}");
         let [lit, sunny] = [None, Some(30.0)].map(|sun| room(&places, 0.0, sun));
-        assert!(Moved::between(&lit, &sunny).is_none());
-        assert!(Moved::between(&sunny, &room(&later, 0.0, Some(30.0))).is_none());
-        assert!(Moved::between(&sunny, &sunny).is_some());
+        assert!(Moved::from_worlds(&lit, &sunny).is_none());
+        assert!(Moved::from_worlds(&sunny, &room(&later, 0.0, Some(30.0))).is_none());
+        assert!(Moved::from_worlds(&sunny, &sunny).is_some());
     }
 }

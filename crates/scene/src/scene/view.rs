@@ -96,7 +96,7 @@ impl View {
         pixel: (u32, u32),
         deep_m: f64,
     ) -> Self {
-        let candidates = bounds.about(cone(camera, pixel));
+        let candidates = bounds.candidates(cone(camera, pixel));
         let mut few = SmallVec::<[(PixelRay, First); RAYS_OF_ALL]>::new();
         for look in looks(camera, pixel, RAYS) {
             few.push((look, stage.meeting_of(&look.ray, &candidates)));
@@ -312,7 +312,7 @@ pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> Cone {
         direction(1.0, 0.0),
         direction(1.0, 1.0),
     ];
-    Cone::about(direction(0.5, 0.5), corners)
+    Cone::enclosing(direction(0.5, 0.5), corners)
 }
 
 /// A ray of a macropixel.

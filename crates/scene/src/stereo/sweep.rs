@@ -139,7 +139,7 @@ impl Job<'_> {
                 }
                 None => sums.fill(0),
             }
-            along(self, self.brightness(row), costs, sums);
+            sum_along_row(self, self.brightness(row), costs, sums);
         });
     }
 
@@ -157,7 +157,7 @@ impl Job<'_> {
     "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx512bitalg",
     "x86_64+avx2"
 ))]
-fn along(job: &Job, brightness: &[u8], costs: &[u8], sums: &mut [u16]) {
+fn sum_along_row(job: &Job, brightness: &[u8], costs: &[u8], sums: &mut [u16]) {
     match job.lanes {
         32 => along_of::<32>(job, brightness, costs, sums),
         64 => along_of::<64>(job, brightness, costs, sums),
@@ -274,7 +274,7 @@ impl<'a> Sweep<'a> {
         let before = self.before.replace(row).unwrap_or(row);
         self.ways.iter_mut().for_each(PathCosts::next_row);
         let bright = (self.job.brightness(row), self.job.brightness(before));
-        across(self.job, &mut self.ways, bright, costs, sums);
+        sum_across_rows(self.job, &mut self.ways, bright, costs, sums);
     }
 
     /// Goes through rows and leaves its sums in `kept`.
@@ -330,7 +330,7 @@ impl<'a> Sweep<'a> {
     "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx512bitalg",
     "x86_64+avx2"
 ))]
-fn across(
+fn sum_across_rows(
     job: &Job,
     ways: &mut [PathCosts],
     bright: (&[u8], &[u8]),

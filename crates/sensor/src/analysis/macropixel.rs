@@ -107,7 +107,7 @@ impl MacropixelTiming {
         let paths = circuit.paths(&timing);
         let delays = MacropixelDelays::measure(&paths);
         let counter = CounterDelays::measure(&paths, &delays);
-        let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, corner));
+        let reset = ResetPulse::from_delays(&circuit, (&delays, &counter), (&library, corner));
         let half_load_period = Time::from_fs(config.load_clock().period().as_fs() / 2);
         let (netlist, probes) = (&circuit.netlist, &circuit.probes);
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));

@@ -154,7 +154,7 @@ impl MacropixelPower {
         let from = origin - exposure.clock.period();
         let mut activity = Activity::new(&netlist, from);
         gate.run(&mut activity);
-        let nets = activity.until(gate.now());
+        let nets = activity.net_activity(gate.now());
         let scope = netlist.scope(gate.probes()[0].macropixel());
         let scope = scope.expect("the simulation has a macropixel");
         let cycles = f64::from(exposure.laser_cycles);
@@ -251,7 +251,7 @@ mod tests {
         Kernel::new(&netlist, &timing)
             .run(&mut Stimulus::sorted(drives), end, &mut activity)
             .expect("no loop of cells without delay");
-        let nets = activity.until(end);
+        let nets = activity.net_activity(end);
         assert_eq!(nets[net("A").index()].toggles, 10);
         assert_eq!(nets[net("Q").index()].toggles, 1);
 

@@ -76,7 +76,7 @@ impl ReadTiming {
         let set_up = stages.flat_map(|cell| {
             let limits = library.checks(cell.kind);
             Edge::BOTH.map(|edge| {
-                let setup = limits.toward(CheckKind::Setup, edge, silicon.corner);
+                let setup = limits.edge_limit_fs(CheckKind::Setup, edge, silicon.corner);
                 let window = from_words.edge_window(cell.input(0), edge);
                 window.map(|(_, last)| last + Time::from_fs(setup.into()))
             })

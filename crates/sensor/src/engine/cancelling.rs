@@ -56,7 +56,7 @@ impl Cancelling {
 
     /// How many of a macropixel's pulses cancel in the windows of this start value: two to a pair. All count where no
     /// single window says which matter.
-    pub(crate) fn seen(&self, start: u16, pulses: &[SpadEvent]) -> u64 {
+    pub(crate) fn cancelled_pulses(&self, start: u16, pulses: &[SpadEvent]) -> u64 {
         let window = self.law.window(start);
         let is_seen = |edge: i64| match &window {
             window_law::WindowOutcome::Open(window) => {

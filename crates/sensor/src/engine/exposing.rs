@@ -258,7 +258,7 @@ fn whole_pixels<E: Replay + ?Sized>(
     let cancelled = cancelling.map_or(0, |cancelling| {
         let seen = |pixel: &PulsedPixel<'_>| {
             let pulses = engine.as_the_law_sees(pixel.number, pixel.pulses);
-            cancelling.seen(pixel.start, &pulses)
+            cancelling.cancelled_pulses(pixel.start, &pulses)
         };
         pulsed.iter().map(seen).sum()
     });

@@ -108,7 +108,7 @@ impl LaneSimulation {
             } else {
                 let bits = self.serial.iter().enumerate();
                 let word = bits.fold(0, |word, (lane, bits)| word | u64::from(bits[bit]) << lane);
-                drives.push(everyone(drive.time, serial, Lanes::known(word)));
+                drives.push(everyone(drive.time, serial, Lanes::from_bits(word)));
                 bit += 1;
             }
         }
@@ -117,7 +117,7 @@ impl LaneSimulation {
             let net = pins.spad_raw[usize::from(pulse.spad)];
             let time = origin + pulse.time;
             let mask = 1 << lane;
-            let (rise, fall) = (Lanes::known(u64::MAX), Lanes::known(0));
+            let (rise, fall) = (Lanes::from_bits(u64::MAX), Lanes::from_bits(0));
             drives.push(LaneDrive {
                 time,
                 net,

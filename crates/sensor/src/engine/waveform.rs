@@ -52,14 +52,14 @@ impl WaveCycles {
         start: u16,
         pulses: &[SpadEvent],
     ) -> u32 {
-        let (_, until) = self.around(config, exposure, start, pulses);
+        let (_, until) = self.kept_cycles(config, exposure, start, pulses);
         let wanted = LEAST_SIMULATED.max(until + 1);
         wanted.min(exposure.laser_cycles.into()) as u32
     }
 
     /// Laser cycles of which the waveform of one macropixel is kept; it has everything from power-up if the first of
     /// them is not after the exposure's first.
-    fn around(
+    fn kept_cycles(
         self,
         config: &SensorConfig,
         exposure: &Exposure,
@@ -191,7 +191,7 @@ impl View {
         pulses: &[SpadEvent],
         cycles: WaveCycles,
     ) -> Self {
-        let (from, until) = cycles.around(config, exposure, start, pulses);
+        let (from, until) = cycles.kept_cycles(config, exposure, start, pulses);
         View {
             kept: stop(exposure, from)..=stop(exposure, until),
             ..Self::of_array(vec![pixel], config, exposure, start)

@@ -78,7 +78,7 @@ impl Calibration {
             if distinct(&depths) < 3 {
                 return Err(CalibrationError::TooFew(zone));
             }
-            let line = |y: &[f64]| Line::through(&arrivals, y);
+            let line = |y: &[f64]| Line::fit(&arrivals, y);
             let (Some(of_counts), Some(of_depths)) = (line(&counts), line(&depths)) else {
                 return Err(CalibrationError::TooFew(zone));
             };
@@ -100,8 +100,7 @@ impl Calibration {
                 .zip(&counts)
                 .map(|(depth, n)| depth - walk_m_per_count * n)
                 .collect();
-            let line =
-                Line::through(&arrivals, &without_walk).ok_or(CalibrationError::TooFew(zone))?;
+            let line = Line::fit(&arrivals, &without_walk).ok_or(CalibrationError::TooFew(zone))?;
             Ok(ZoneCalibration {
                 scale_m: line.slope,
                 offset_m: line.value(0.0),
@@ -139,7 +138,7 @@ struct Line {
 
 impl Line {
     /// Through at least three points at three different x.
-    fn through(x: &[f64], y: &[f64]) -> Option<Self> {
+    fn fit(x: &[f64], y: &[f64]) -> Option<Self> {
         if distinct(x) < 3 {
             return None;
         }

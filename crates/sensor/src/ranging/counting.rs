@@ -65,7 +65,7 @@ impl Counting {
                 0.0
             };
             let chance = of_others * (1.0 - clamped) + fewer * clamped;
-            let (holds, slope) = self.given(n, children.value);
+            let (holds, slope) = self.conditional_chance(n, children.value);
             value += chance * holds;
             by_children += chance * slope;
             by_fired += of_all * (fewer - of_others) * holds;
@@ -116,7 +116,7 @@ impl Counting {
 
     /// The chance that a bin counts in which `n` SPADs fired by light, and its slope with `children`.
     #[inline]
-    fn given(&self, n: usize, children: f64) -> (f64, f64) {
+    fn conditional_chance(&self, n: usize, children: f64) -> (f64, f64) {
         if children <= 0.0 || n == 0 {
             return (f64::from(u8::from(self.counts(n))), 0.0);
         }

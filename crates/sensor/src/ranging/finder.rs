@@ -237,7 +237,7 @@ impl EchoFinder {
             Err(left) => Err(*left),
         });
         let (fitted, others) = if corrects {
-            self.beside(&real, &peak, whole, share)
+            self.first_echo_and_others(&real, &peak, whole, share)
         } else {
             (whole, Others::default())
         };
@@ -282,7 +282,7 @@ impl EchoFinder {
 
     /// The first echo's light, from its own bins where there are others, and those others. `whole` is what all bins together say of it, and
     /// `share` that of each bin in light that comes at any time alike.
-    fn beside(
+    fn first_echo_and_others(
         &self,
         counts: &[f64],
         peak: &Peak,

@@ -71,7 +71,7 @@ impl Steps {
         dead: f64,
     ) -> Rc<Self> {
         let steps = u8::try_from(steps).expect("few steps");
-        let lit = pulses.iter().map(|pulse| pulse.within(BEGINS, ENDS));
+        let lit = pulses.iter().map(|pulse| pulse.extent(BEGINS, ENDS));
         let lit: SmallVec<[[f64; 2]; LANES]> = lit.collect();
         let is_lit = |begin: f64| {
             lit.iter()

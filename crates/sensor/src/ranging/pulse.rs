@@ -48,7 +48,7 @@ impl Pulse {
     }
 
     /// From `before` standard deviations before its centre to `after` ones behind it, and its late avalanches.
-    pub(super) fn within(&self, before: f64, after: f64) -> [f64; 2] {
+    pub(super) fn extent(&self, before: f64, after: f64) -> [f64; 2] {
         let late = self.tail.map_or(0.0, |tail| TAIL_REACH * tail.bins);
         let ends = self.centre + after * self.sigma + late;
         [self.centre - before * self.sigma, ends]

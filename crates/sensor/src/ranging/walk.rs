@@ -148,7 +148,7 @@ impl WalkCorrection {
         }
         fits[0] = self.darker(&of_all, fits[0]);
         if fits[0].explains() {
-            return self.told(&wide, &fits);
+            return self.corrected_peak(&wide, &fits);
         }
         // Few photons are an echo in one place only.
         let is_weak = fits[0].has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
@@ -156,7 +156,7 @@ impl WalkCorrection {
             fits = self.of_many(&of_all, (peak, background))?;
             fits[0] = self.darker(&of_all, fits[0]);
             if fits[0].explains() {
-                return self.told(&wide, &fits);
+                return self.corrected_peak(&wide, &fits);
             }
         }
         let best = fits[0];
@@ -174,7 +174,7 @@ impl WalkCorrection {
         }
         // Fits need not converge on the flat stretch that is a short pulse's place.
         if self.is_short(&best) {
-            return self.told(&wide, &fits);
+            return self.corrected_peak(&wide, &fits);
         }
         Err(WalkLeft::NotConverged)
     }
@@ -193,7 +193,11 @@ impl WalkCorrection {
     ///
     /// # Errors
     /// As `widened`.
-    fn told(&self, wide: &Likelihood<'_>, fits: &[Fit]) -> Result<CorrectedPeak, WalkLeft> {
+    fn corrected_peak(
+        &self,
+        wide: &Likelihood<'_>,
+        fits: &[Fit],
+    ) -> Result<CorrectedPeak, WalkLeft> {
         let widened = self.widened(wide, fits[0])?;
         let told = if self.is_short(&fits[0]) {
             averaged(wide, fits, &widened)

@@ -12,7 +12,7 @@ use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, Z_95, deviation, share};
 use crate::numerics::{ln_normal_below, normal_density};
 use crate::reproduce::measured::FRAMES;
-use crate::reproduce::measured::detection::judged;
+use crate::reproduce::measured::detection::detection_share;
 use crate::reproduce::measured::precision::{Estimator, errors_ns};
 use crate::reproduce::measured::trial::Trial;
 use crate::theory::partial::{ExposureStep, StepPurpose, System, largest_mean};
@@ -90,7 +90,7 @@ pub(super) fn measured_cycles(step: &ExposureStep) -> u32 {
 }
 
 /// Photon light at a range, on this macropixel.
-fn lit(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
+fn trial_at(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
     Trial {
         sensor: sensor.clone(),
         ..Trial::of_link(&system.link, range_m, cycles)
@@ -113,7 +113,7 @@ pub(super) fn measuring(
     let cycles = measured_cycles(step);
     let trial = Trial {
         echo_bins: f64::from(system.bins / 2),
-        ..lit(system, sensor, step.range_m, cycles)
+        ..trial_at(system, sensor, step.range_m, cycles)
     };
     let trial = trial.with_sensor_change(|sensor| sensor.clk_hz = 1.0 / system.bin_s);
     let all = errors_ns(&trial, frames, seed(step) + 1, Estimator::Likelihood)?;
@@ -131,7 +131,7 @@ pub(super) fn detecting(
         return Ok(None);
     };
     let reckoned = step.laser_cycles;
-    let trial = lit(system, sensor, step.range_m, reckoned as u32);
+    let trial = trial_at(system, sensor, step.range_m, reckoned as u32);
     let trial = trial.in_coarse_bins(candidates, bin_m);
 
     let light = trial.per_cycle();
@@ -165,7 +165,7 @@ pub(super) fn detecting(
         candidates,
         bin_m,
         reckoned,
-        found: judged(&trial, &counts, true),
+        found: detection_share(&trial, &counts, true),
         frames,
         cycles: cycles_from(&counts, reckoned, system.goal.detection),
         exposures,

@@ -28,13 +28,13 @@ fn off(glints: &[Glint], echoes: &[Echo]) -> f64 {
         let time_fs = first - 6.0 * SIGMA_FS + width_fs * f64::from(step) / 2000.0;
         let exact: f64 = glints
             .iter()
-            .map(|glint| glint.photons * below((time_fs - glint.arrival_fs) / SIGMA_FS))
+            .map(|glint| glint.photons * normal_cdf((time_fs - glint.arrival_fs) / SIGMA_FS))
             .sum();
         let given: f64 = echoes
             .iter()
             .map(|echo| {
                 let sigma_fs = echo.sigma.unwrap().as_fs() as f64;
-                echo.photons * below((time_fs - echo.arrival.as_fs() as f64) / sigma_fs)
+                echo.photons * normal_cdf((time_fs - echo.arrival.as_fs() as f64) / sigma_fs)
             })
             .sum();
         (exact - given).abs() / all
@@ -92,7 +92,8 @@ fn slices_of_a_slanted_surface_have_a_flat_top() {
         let before = |z: f64| -> f64 {
             let share = |echo: &Echo| {
                 let sigma_fs = echo.sigma.unwrap().as_fs() as f64;
-                echo.photons * below((z * SIGMA_FS + 4e8 - echo.arrival.as_fs() as f64) / sigma_fs)
+                echo.photons
+                    * normal_cdf((z * SIGMA_FS + 4e8 - echo.arrival.as_fs() as f64) / sigma_fs)
             };
             echoes.iter().map(share).sum::<f64>() / 64.0
         };

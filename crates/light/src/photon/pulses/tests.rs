@@ -324,7 +324,7 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
 }
 
 /// Fraction of photons that make edges at this rate per SPAD, in cycles much shorter than the dead time.
-fn seen(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
+fn edge_share(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
     let config = StreamConfig {
         clock: Frequency::from_hz(100_000_000),
         stop_periods: 2,
@@ -345,8 +345,8 @@ fn seen(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
 fn dead_time_carries_over_from_cycle_to_cycle_by_either_law() {
     for load in [0.2, 1.0, 5.0] {
         let hz = load / 100e-9;
-        let non_paralysable = seen(DeadTimeLaw::NonParalysable, hz) * (1.0 + load);
-        let paralysable = seen(DeadTimeLaw::Paralysable, hz) / (-load).exp();
+        let non_paralysable = edge_share(DeadTimeLaw::NonParalysable, hz) * (1.0 + load);
+        let paralysable = edge_share(DeadTimeLaw::Paralysable, hz) / (-load).exp();
         assert!((non_paralysable - 1.0).abs() < 0.05, "{non_paralysable}");
         assert!((paralysable - 1.0).abs() < 0.12, "{paralysable}");
     }

@@ -118,7 +118,7 @@ impl PhotonStream {
 
     /// Groups of the exposure; the last one may outlast it.
     pub fn groups(&self) -> impl Iterator<Item = CycleGroup> + use<> {
-        CycleGroup::until(self.config.laser_cycles, self.config.spads.grid)
+        CycleGroup::groups_until(self.config.laser_cycles, self.config.spads.grid)
     }
 }
 

@@ -83,7 +83,7 @@ impl CycleGroup {
     }
 
     /// All groups that begin before laser cycle `end`.
-    pub(crate) fn until(end: u32, grid: SpadGrid) -> impl Iterator<Item = Self> {
+    pub(crate) fn groups_until(end: u32, grid: SpadGrid) -> impl Iterator<Item = Self> {
         let mut next = Some(0);
         std::iter::from_fn(move || {
             let group = CycleGroup::of_cycle(next.filter(|&first| first < end)?, grid);
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn lengths_double_up_to_the_longest() {
-        let groups: Vec<_> = CycleGroup::until(4097, SpadGrid::default())
+        let groups: Vec<_> = CycleGroup::groups_until(4097, SpadGrid::default())
             .map(|group| (group.first_cycle(), group.cycles()))
             .collect();
         let expected = [
@@ -164,8 +164,11 @@ mod tests {
             (4096, 2048),
         ];
         assert_eq!(groups, expected);
-        assert_eq!(CycleGroup::until(0, SpadGrid::default()).count(), 0);
-        assert_eq!(CycleGroup::until(129, SpadGrid::default()).count(), 2);
+        assert_eq!(CycleGroup::groups_until(0, SpadGrid::default()).count(), 0);
+        assert_eq!(
+            CycleGroup::groups_until(129, SpadGrid::default()).count(),
+            2
+        );
     }
 
     proptest! {

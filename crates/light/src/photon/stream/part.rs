@@ -73,7 +73,7 @@ pub struct PixelStream<'a> {
 }
 
 /// Whether two ranges have something in common.
-fn meet(a: &Range<u32>, b: &Range<u32>) -> bool {
+fn overlap(a: &Range<u32>, b: &Range<u32>) -> bool {
     a.start.max(b.start) < a.end.min(b.end)
 }
 
@@ -210,7 +210,7 @@ impl PixelStream<'_> {
     }
 
     /// Whether these are the photons whose avalanches trigger others.
-    pub fn breeds(&self) -> bool {
+    pub fn has_secondaries(&self) -> bool {
         self.kind == PhotonKind::Breeding
     }
 
@@ -371,13 +371,13 @@ impl PixelStream<'_> {
     /// Whether some of these laser cycles may have background photons that are kept.
     pub fn has_background_in(&self, cycles: &Range<u32>) -> bool {
         let limits = self.limits.as_ref();
-        self.gap_fs.is_finite() && limits.is_none_or(|limits| meet(&limits.drawn(), cycles))
+        self.gap_fs.is_finite() && limits.is_none_or(|limits| overlap(&limits.drawn(), cycles))
     }
 
     /// Whether photons of the echoes of some of these laser cycles may be kept.
     pub(super) fn has_echo_in(&self, cycles: &Range<u32>) -> bool {
         let limits = self.limits.as_ref();
-        limits.is_none_or(|limits| meet(&limits.cycles, cycles))
+        limits.is_none_or(|limits| overlap(&limits.cycles, cycles))
     }
 
     /// Whether photons of the echo of a laser cycle may be kept.

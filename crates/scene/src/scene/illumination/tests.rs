@@ -267,7 +267,7 @@ fn crosstalk_of_an_echo_does_not_depend_on_one_before_it() {
     }
 }
 
-fn below(z: f64) -> f64 {
+fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
@@ -320,7 +320,7 @@ fn light_of_few_rays_is_close_to_that_of_very_many() {
         for step in 0..=steps {
             let time_fs = first + (last - first) * f64::from(step) / f64::from(steps);
             let early = |photons: f64, centre_fs: f64, sigma_fs: f64| {
-                photons * below((time_fs - centre_fs) / sigma_fs)
+                photons * normal_cdf((time_fs - centre_fs) / sigma_fs)
             };
             let all: f64 = exact
                 .iter()

@@ -41,7 +41,7 @@ impl Flat {
         }
     }
 
-    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let away_m = (self.centre_m - ray.origin).dot(self.normal);
         let range_m = in_front(away_m / ray.direction.dot(self.normal))?;
         let point = ray.point(range_m);

@@ -166,7 +166,7 @@ impl DepthMap {
     }
 
     /// Where a ray in the camera's coordinates first meets the map.
-    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let (origin, direction) = (ray.origin, ray.direction);
         if direction.z <= 0.0 {
             return None;
@@ -334,7 +334,7 @@ mod tests {
     const CAMERA: fn() -> PinholeCamera = || PinholeCamera::centred(50.0, 40, 30);
 
     /// What a camera sees of some shapes, along its axis.
-    fn seen(shapes: &[Shape], is_range: bool) -> Vec<f32> {
+    fn camera_depths(shapes: &[Shape], is_range: bool) -> Vec<f32> {
         let pixel = |at: usize| ((at % 40) as f64 + 0.5, (at / 40) as f64 + 0.5);
         let depth = |at: usize| {
             let ray = Ray::new(DVec3::ZERO, CAMERA().at_unit_depth(pixel(at)));
@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn from_beside_near_things_move_before_far_ones() {
         let shapes = [wall(4.0, 1.0, 0.0), wall(20.0, 1e3, 0.0)];
-        let map = read(&seen(&shapes, false), None, false).unwrap();
+        let map = read(&camera_depths(&shapes, false), None, false).unwrap();
         let origin = DVec3::new(0.5, 0.0, 0.0);
         let mut ends = (0, 0);
         for column in 0..40 {
@@ -416,7 +416,7 @@ mod tests {
                 .filter_map(|s| s.intersect(&ray))
                 .reduce(f64::min)
                 .unwrap();
-            let Some(Meeting { range_m, .. }) = map.meet(&ray) else {
+            let Some(Meeting { range_m, .. }) = map.intersect(&ray) else {
                 continue; // Beyond the map's edge.
             };
             ends.0 += u32::from((range_m - expected).abs() < 1e-3);
@@ -431,11 +431,11 @@ mod tests {
         #[test]
         fn planes_come_back(tilt in -0.8f64..0.8, z_m in 3.0f64..60.0, u in 8.0f64..32.0, v in 8.0f64..22.0, beside in -0.3f64..0.3, is_range: bool) {
             let plane = wall(z_m, 1e4, tilt);
-            let map = read(&seen(std::slice::from_ref(&plane), is_range), None, is_range).unwrap();
+            let map = read(&camera_depths(std::slice::from_ref(&plane), is_range), None, is_range).unwrap();
             for origin in [DVec3::ZERO, DVec3::new(beside, 0.3 * beside, -0.1)] {
                 let ray = Ray::new(origin, CAMERA().at_unit_depth((u, v)));
                 let expected = plane.intersect(&ray).unwrap();
-                let Meeting { range_m, .. } = map.meet(&ray).unwrap();
+                let Meeting { range_m, .. } = map.intersect(&ray).unwrap();
                 prop_assert!((range_m / expected - 1.0).abs() < 1e-5, "{range_m} {expected}");
                 let normal = map.normal_at(ray.point(range_m));
                 prop_assert!(normal.dot(plane.placed().normal_at(DVec3::ZERO, 0)).abs() > 1.0 - 1e-4);

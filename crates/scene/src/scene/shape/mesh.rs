@@ -187,7 +187,7 @@ impl Mesh {
             Bounds(Aabb::new(bounds.min - room, bounds.max + room))
         };
         let bounds: Vec<Bounds> = listed.triangles.iter().map(grown).collect();
-        let (tree, numbers) = Tree::over(&bounds);
+        let (tree, numbers) = Tree::build(&bounds);
         drop(bounds);
         let in_order = || numbers.iter().map(|&number| number as usize);
         Mesh {
@@ -217,7 +217,7 @@ impl Mesh {
 
     /// Where a ray in the mesh's own coordinates first meets it; the part is the triangle's place in the tree's order. Of two in the same
     /// place the one listed first in the file counts.
-    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let about = Ray {
             origin: ray.origin - self.middle,
             direction: ray.direction,

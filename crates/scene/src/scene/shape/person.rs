@@ -45,7 +45,7 @@ pub(super) const AROUND: (DVec3, DVec3) = (point(0.0, -0.5, 0.0), point(0.38, 1.
 
 /// Where a ray in the person's own place and turn meets a person of `height_m`. The part is the limb, and in steps of 8
 /// the axis of the trunk's face.
-pub(super) fn meet(ray: &Ray, height_m: f64) -> Option<Meeting> {
+pub(super) fn intersect(ray: &Ray, height_m: f64) -> Option<Meeting> {
     let ray = Ray {
         origin: ray.origin / height_m,
         direction: ray.direction,
@@ -139,7 +139,7 @@ mod tests {
                 if step < 1e-8 { break }
                 walked = (so_far < 9.0 * height_m).then_some(so_far + step * height_m);
             }
-            let met = meet(&ray, height_m);
+            let met = intersect(&ray, height_m);
             match (met, walked) {
                 (None, None) => {}
                 (Some(Meeting { range_m, part }), Some(walked_m)) => {

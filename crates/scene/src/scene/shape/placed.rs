@@ -52,7 +52,7 @@ impl Shape {
     /// Distance along `ray` to the first surface point in front of its origin, m.
     #[cfg(test)]
     pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
-        self.placed().meet(ray).map(|meeting| meeting.range_m)
+        self.placed().intersect(ray).map(|meeting| meeting.range_m)
     }
 
     /// The shape made ready for many rays.
@@ -121,10 +121,10 @@ impl<'a> PlacedShape<'a> {
     }
 
     /// Where a ray first meets the surface.
-    pub(in crate::scene) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(in crate::scene) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         match *self {
             PlacedShape::Ground { depth_m } => flat::meet_ground(ray, depth_m),
-            PlacedShape::Plane(ref flat) => flat.meet(ray),
+            PlacedShape::Plane(ref flat) => flat.intersect(ray),
             PlacedShape::Box { pose, size_m } => solid::meet_box(&pose.inwards(ray), size_m),
             PlacedShape::Sphere { centre_m, radius_m } => {
                 round::meet_sphere(ray, centre_m, radius_m)
@@ -135,7 +135,9 @@ impl<'a> PlacedShape<'a> {
                 radius_m,
                 height_m,
             } => round::meet_cylinder(ray, centre_m, axis, (radius_m, height_m)),
-            PlacedShape::Person { pose, height_m } => person::meet(&pose.inwards(ray), height_m),
+            PlacedShape::Person { pose, height_m } => {
+                person::intersect(&pose.inwards(ray), height_m)
+            }
             PlacedShape::Mesh {
                 pose,
                 scale_m,
@@ -146,11 +148,11 @@ impl<'a> PlacedShape<'a> {
                     origin: inside.origin / scale_m,
                     direction: inside.direction,
                 };
-                let meeting = mesh.meet(&scaled)?;
+                let meeting = mesh.intersect(&scaled)?;
                 let range_m = in_front(meeting.range_m * scale_m)?;
                 Some(Meeting { range_m, ..meeting })
             }
-            PlacedShape::Map { pose, map } => map.meet(&pose.inwards(ray)),
+            PlacedShape::Map { pose, map } => map.intersect(&pose.inwards(ray)),
         }
     }
 

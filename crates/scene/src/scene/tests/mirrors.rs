@@ -229,7 +229,7 @@ fn fog_before_a_mirror_or_pane_is_there_once() {
 }
 
 /// Something at the image that the lidar sees, and then what there is.
-fn thing(place: DVec3, normal: DVec3, is_ball: bool) -> Object {
+fn object_at(place: DVec3, normal: DVec3, is_ball: bool) -> Object {
     let shape = if is_ball {
         Shape::Sphere {
             centre_m: place,
@@ -278,12 +278,12 @@ proptest! {
         prop_assume!(distance_m(place, ways[0]) > 1.0 && distance_m(place, ways[1]) > 1.0);
         prop_assume!(distance_m(two.0, ways[0]) > 1.0 && distance_m(one.0, ways[2]) > 1.0);
         let mut scene = lidar();
-        scene.objects = vec![thing(seen, facing, is_ball)];
+        scene.objects = vec![object_at(seen, facing, is_ball)];
         let straight = light(&scene);
         scene.objects = vec![
             mirror(sheet(one.0, one.1, 1.0), 0.9),
             mirror(sheet(two.0, two.1, 1.0), 0.8),
-            thing(place, turned, is_ball),
+            object_at(place, turned, is_ball),
         ];
         are_alike(&light(&scene), &straight, (0.9f64 * 0.8).powi(2))?;
     }

@@ -2,7 +2,7 @@
 //! numbers without limits.
 
 use super::settings::Matcher;
-use super::winner::between;
+use super::winner::subpixel_offset;
 use super::{DisparityMap, GreyImage};
 
 fn census(image: &GreyImage, matcher: &Matcher, x: i64, y: i64) -> Vec<bool> {
@@ -148,7 +148,7 @@ pub(super) fn match_pair(matcher: &Matcher, left: &GreyImage, right: &GreyImage)
                 continue;
             }
             let beyond = match (sum(x, best - 1), sum(x, best + 1)) {
-                (Some(less), Some(more)) => between(less as u16, least as u16, more as u16),
+                (Some(less), Some(more)) => subpixel_offset(less as u16, least as u16, more as u16),
                 _ => 0.0,
             };
             px[index(x, y)] = (min + best) as f32 + beyond;

@@ -115,7 +115,7 @@ struct CheckedBlock<'n> {
 }
 
 impl<'n> CheckedBlock<'n> {
-    fn after(&self, from: &[NetId], edges: &[Edge]) -> Arrivals<'n> {
+    fn arrivals_after(&self, from: &[NetId], edges: &[Edge]) -> Arrivals<'n> {
         let starts = from
             .iter()
             .flat_map(|&net| edges.iter().map(move |&edge| (net, edge)));
@@ -211,7 +211,7 @@ impl Contract {
 
 fn p_counter(found: &CheckedBlock<'_>) -> Option<String> {
     let clk = found.probes.net(Probe::CounterClk);
-    let after = found.after(&[clk], &[Edge::Rise]);
+    let after = found.arrivals_after(&[clk], &[Edge::Rise]);
     let mut cells = found.netlist.cells().iter();
     let counts = cells.any(|cell| {
         let is_clocked = cell.kind.is_flip_flop() && cell.input(1) == clk;
@@ -233,7 +233,7 @@ fn p_counter(found: &CheckedBlock<'_>) -> Option<String> {
 }
 
 fn correlation(found: &CheckedBlock<'_>) -> Option<String> {
-    let after = found.after(found.probes.bus(Probe::SpadTimed), &Edge::BOTH);
+    let after = found.arrivals_after(found.probes.bus(Probe::SpadTimed), &Edge::BOTH);
     let changes = after.window(found.probes.net(Probe::SpadEvent)).is_some();
     let flaw = "has a SPAD_EVENT that no SPAD_TIMED changes; make it of gates behind them";
     (!changes).then(|| flaw.to_owned())
@@ -258,7 +258,7 @@ fn front_end(found: &CheckedBlock<'_>) -> Option<String> {
             "has a SPAD_RAW[{spad}] that no flip-flop samples; take it, or what it toggles, with posedge CLK"
         ));
     }
-    let after = found.after(&[probes.net(Probe::Clk)], &[Edge::Rise]);
+    let after = found.arrivals_after(&[probes.net(Probe::Clk)], &[Edge::Rise]);
     let mut lines = probes.bus(Probe::SpadTimed).iter();
     let line = lines.position(|&line| after.window(line).is_none())?;
     Some(format!(
@@ -295,7 +295,7 @@ fn metdc(found: &CheckedBlock<'_>) -> Option<String> {
         );
     }
     TO_HIT.into_iter().find_map(|(from, edge, pin, to)| {
-        let after = found.after(&[probes.net(from)], &[edge]);
+        let after = found.arrivals_after(&[probes.net(from)], &[edge]);
         let leads = |cell: &&FlatCell| match to {
             Some(to) => after.edge_window(cell.input(pin), to).is_some(),
             None => after.window(cell.input(pin)).is_some(),

@@ -484,7 +484,7 @@ impl<'c> Load<'c> {
             time,
             net,
             mask: u64::MAX,
-            values: Lanes::known(word),
+            values: Lanes::from_bits(word),
         });
         self.now += SHORTEST_PAUSE;
         self.kernel

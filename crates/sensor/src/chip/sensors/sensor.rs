@@ -66,7 +66,7 @@ impl Sensor {
         } = &*self.0;
         delays.get_or_init(|| {
             if *silicon == Silicon::new(config) {
-                MeasuredDelays::known(config)
+                MeasuredDelays::cached(config)
             } else {
                 MeasuredDelays::measure(config, silicon)
             }

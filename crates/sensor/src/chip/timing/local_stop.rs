@@ -64,7 +64,10 @@ impl LocalStopDelays {
         if spread(self.bounds) == Time::ZERO {
             return self.bounds.1;
         }
-        self.counter.counted(start).delay.unwrap_or(self.bounds.1)
+        self.counter
+            .count_down(start)
+            .delay
+            .unwrap_or(self.bounds.1)
     }
 
     /// The count that raises LOCAL_STOP from a start value with these delays, the first count being 0, if that is not the one that the
@@ -77,7 +80,7 @@ impl LocalStopDelays {
         if spread(self.bounds) == Time::ZERO && config.p_counter.row().has_memory {
             return None;
         }
-        let found = self.counter.counted(start).rises[0];
+        let found = self.counter.count_down(start).rises[0];
         let expected = Rises::from_start_value(config, start).map(|rises| rises.first);
         (found.map(i64::from) != expected).then_some(found)
     }
@@ -93,7 +96,7 @@ impl LocalStopDelays {
     /// all.
     pub fn latest(&self) -> (u16, Time) {
         let simulated = |start| {
-            let delay = self.counter.counted(start).delay;
+            let delay = self.counter.count_down(start).delay;
             (delay.unwrap_or(self.bounds.1), start)
         };
         // The least of the start values that take as long.
@@ -132,7 +135,7 @@ impl Counter {
         }
     }
 
-    fn counted(&self, start: u16) -> CountDownResult {
+    fn count_down(&self, start: u16) -> CountDownResult {
         let (chunk, place) = (usize::from(start) / LANES, usize::from(start) % LANES);
         self.measured[chunk].get_or_init(|| self.measure(chunk))[place]
     }

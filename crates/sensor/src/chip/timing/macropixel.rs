@@ -227,7 +227,7 @@ impl<'c> MacropixelPaths<'c> {
 
     /// What an edge of CLK changes.
     pub(crate) fn after_clk(&self, edge: Edge) -> Arrivals<'c> {
-        self.after(
+        self.arrivals_after(
             Probe::Clk,
             &[edge],
             &[
@@ -274,7 +274,7 @@ impl<'c> MacropixelPaths<'c> {
     /// What a change of RUN, the macropixels' ENABLE, changes.
     pub(crate) fn after_enable(&self) -> Arrivals<'c> {
         let cuts = [Probe::CounterReset, Probe::CounterClk];
-        self.after(Probe::Enable, &Edge::BOTH, &cuts)
+        self.arrivals_after(Probe::Enable, &Edge::BOTH, &cuts)
     }
 
     /// The flip-flop of a bin's lowest bit, and HIT's rise (latest) and fall (earliest) → its clock. None where HIT does not clock it.
@@ -301,7 +301,7 @@ impl<'c> MacropixelPaths<'c> {
     fn block_to_counter_clk(&self) -> Option<Time> {
         self.circuit.probes.find(Probe::Block)?;
         let cuts = [Probe::CounterClk, self.circuit.probes.latched_probe()];
-        let blocked = self.after(Probe::Block, &[Edge::Rise], &cuts);
+        let blocked = self.arrivals_after(Probe::Block, &[Edge::Rise], &cuts);
         let counter_clk = self.circuit.probes.net(Probe::CounterClk);
         Some(blocked.edge_window(counter_clk, Edge::Fall)?.0)
     }
@@ -322,7 +322,7 @@ impl<'c> MacropixelPaths<'c> {
             .reduce(hull)
     }
 
-    fn after(&self, from: Probe, edges: &[Edge], cuts: &[Probe]) -> Arrivals<'c> {
+    fn arrivals_after(&self, from: Probe, edges: &[Edge], cuts: &[Probe]) -> Arrivals<'c> {
         let probes = &self.circuit.probes;
         let starts: Vec<(NetId, Edge)> =
             edges.iter().map(|&edge| (probes.net(from), edge)).collect();

@@ -26,7 +26,7 @@ pub(in crate::chip) struct MeasuredDelays {
 impl ChipTiming {
     /// The timing of a sensor without mismatch, in its corner at its temperature.
     pub fn new(config: &SensorConfig) -> Self {
-        MeasuredDelays::known(config).timing
+        MeasuredDelays::cached(config).timing
     }
 
     /// Measures macropixel (0, 0) of a sensor made of this silicon: the latest that each signal comes.
@@ -58,11 +58,11 @@ impl ResetPulse {
         let delays = MacropixelDelays::measure(&paths);
         let counter = CounterDelays::measure(&paths, &delays);
         let limits = (&silicon.limits(Limits::Kept), silicon.corner);
-        Self::among(&circuit, (&delays, &counter), limits)
+        Self::from_delays(&circuit, (&delays, &counter), limits)
     }
 
     /// The same of delays that are known.
-    pub(crate) fn among(
+    pub(crate) fn from_delays(
         circuit: &MacropixelCircuit,
         (delays, counter): (&MacropixelDelays, &CounterDelays),
         (library, corner): (&Library, Corner),
@@ -103,7 +103,7 @@ impl MeasuredDelays {
     ///
     /// Measured once for every circuit and corner, and remembered: a measurement takes 0.6 ms, four times as long as
     /// elaborating the macropixel; and window laws are asked for by the thousand.
-    pub(in crate::chip) fn known(config: &SensorConfig) -> Self {
+    pub(in crate::chip) fn cached(config: &SensorConfig) -> Self {
         static MEASURED: LazyLock<Mutex<HashMap<Circuit, MeasuredDelays>>> =
             LazyLock::new(Mutex::default);
         let measured = || MEASURED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -124,7 +124,8 @@ impl MeasuredDelays {
         let delays = MacropixelDelays::measure(&paths);
         let counter = CounterDelays::measure(&paths, &delays);
         let library = silicon.limits(Limits::Kept);
-        let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, silicon.corner));
+        let reset =
+            ResetPulse::from_delays(&circuit, (&delays, &counter), (&library, silicon.corner));
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
         let clk = Requirements::behind(&circuit.netlist, clk, &library, silicon.corner);
         let (_, clk) = circuit.split(clk.all(), false);

@@ -137,10 +137,10 @@ impl Edges {
                 Some(ready),
             );
         }
-        self.counted(first, stops.len() == 1)
+        self.strobe_outcome(first, stops.len() == 1)
     }
 
-    fn counted(&self, counted: i64, is_regular: bool) -> StartValueOutcome {
+    fn strobe_outcome(&self, counted: i64, is_regular: bool) -> StartValueOutcome {
         let strobe = self.strobe(counted);
         let cause = strobe - self.timing.local_stop_to_strobe;
         StartValueOutcome::Strobe {
@@ -222,7 +222,7 @@ impl Edges {
                 }
             }
         }
-        self.counted(counted + first, periods == every)
+        self.strobe_outcome(counted + first, periods == every)
     }
 
     fn strobed(&self, start: u16) -> StartValueOutcome {
@@ -453,7 +453,7 @@ fn meets() -> impl Strategy<Value = Option<Meet>> {
 }
 
 impl Edges {
-    fn meet(&mut self, meet: Option<Meet>) {
+    fn apply_meet(&mut self, meet: Option<Meet>) {
         match meet {
             None => {}
             Some(Meet::Reset(edge, off)) => {
@@ -506,7 +506,7 @@ proptest! {
         }
         let exposure = Exposure::new(&config, stop_periods, laser_cycles);
         let mut edges = Edges { config, exposure, timing };
-        edges.meet(meet);
+        edges.apply_meet(meet);
         if edges.config.tdc == Tdc::Counter {
             // START does not come before what sets it.
             edges.timing.strobe_to_hit = edges.timing.strobe_to_hit.max(Time::ZERO);

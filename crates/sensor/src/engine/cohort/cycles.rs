@@ -271,7 +271,7 @@ impl Scene {
         match &self.edges_fs {
             Some(edges_fs) => {
                 let edges_fs: Vec<f64> = edges_fs.iter().map(|edge| self.from_fs + edge).collect();
-                self.light.between(&edges_fs, extent).into()
+                self.light.mean_photons(&edges_fs, extent).into()
             }
             None => (self.light).steps(self.from_fs, self.period_fs, self.bins, extent),
         }

@@ -218,7 +218,7 @@ fn carry(
     let absolute: Vec<f64> = grid.edges.iter().map(|edge| scene.from_fs + edge).collect();
     let cells: Vec<HazardCell> = scene
         .light
-        .between(&absolute, &class.extent)
+        .mean_photons(&absolute, &class.extent)
         .into_iter()
         .map(HazardCell::new)
         .collect();
@@ -292,11 +292,17 @@ impl Spad {
             let [ours, _] = light.hit_and_ready(ready[0] + ready[1], returning[0] + returning[1]);
             crossing.push(secondaries.crosstalk * ours);
             let width_fs = self.width_fs(cell);
-            acts.push(secondaries.act(light, crossing[cell], width_fs, &mut ready, returning));
+            acts.push(secondaries.advance_cell(
+                light,
+                crossing[cell],
+                width_fs,
+                &mut ready,
+                returning,
+            ));
         }
         let acts = &acts[back..];
         let in_period =
-            |number: usize| -> f64 { acts[self.period(number)].iter().map(Acts::seen).sum() };
+            |number: usize| -> f64 { acts[self.period(number)].iter().map(Acts::pulse_sum).sum() };
 
         let windows = memory..memory + self.bins();
         let mut fine = Fine {
@@ -325,9 +331,14 @@ impl Spad {
                         let returning = from.map_or([0.0; 2], |from| acts[from].pulses);
                         blind -= returning[0] + returning[1];
                         let (light, width_fs) = (&self.cells[cell], self.width_fs(cell));
-                        let act =
-                            secondaries.act(light, crossing[cell], width_fs, &mut ready, returning);
-                        fired += act.seen();
+                        let act = secondaries.advance_cell(
+                            light,
+                            crossing[cell],
+                            width_fs,
+                            &mut ready,
+                            returning,
+                        );
+                        fired += act.pulse_sum();
                         // Who is blinded without a pulse stays so for as long as that matters.
                         blind += act.silent[0] + act.silent[1];
                     }

@@ -181,7 +181,7 @@ impl<'a> Tree<'a> {
     fn age(&mut self, ages: &Ages, random: &mut RandomWords) {
         let mut younger: f64 = 1.0;
         for &share in ages.aged.iter().rev() {
-            let p = Ages::among(share, younger);
+            let p = Ages::conditional_share(share, younger);
             younger -= share;
             self.laws.forget();
             self.each_node(|tree, node| {
@@ -246,7 +246,7 @@ impl<'a> Tree<'a> {
             let Node { parent, oldest, .. } = self.nodes[at as usize];
             let age = (self.step - oldest.step) as usize;
             let step = self.step as usize - self.blindness.memory();
-            let able = self.blindness.able(step, age);
+            let able = self.blindness.firing_probability(step, age);
             let (class, p, q, able) = match self.blindness.law {
                 DeadTimeLaw::NonParalysable => (age, p * able, q + p * (1.0 - able), 1.0),
                 DeadTimeLaw::Paralysable => (FREE, p, q, able),

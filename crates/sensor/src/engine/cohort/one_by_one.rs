@@ -34,7 +34,7 @@ pub(super) fn draw_counts(
                 continue;
             }
             let able = fired.map_or(1.0, |before| {
-                blindness.able(step as usize, (step - before) as usize)
+                blindness.firing_probability(step as usize, (step - before) as usize)
             });
             let makes_pulse = random.uniform() < able;
             pulses += usize::from(makes_pulse);

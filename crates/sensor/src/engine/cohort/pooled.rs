@@ -41,13 +41,13 @@ pub(super) fn largest(means: &Means) -> f64 {
     means.iter().copied().fold(0.0, f64::max)
 }
 
-/// Most photons on a SPAD in a CLK period with which [`run`] leaves out no larger correlations between two bins than this
+/// Most photons on a SPAD in a CLK period with which [`draw_counts`] leaves out no larger correlations between two bins than this
 /// `neglect`: ρ for it is eᵐ − 1 with m photons.
 pub(super) fn most_photons(neglect: f64) -> f64 {
     libm::log1p(neglect.sqrt())
 }
 
-/// Mean number of SPADs in a period that [`run`] has to follow one by one, of `spads` in all laser cycles, with `photons` on a SPAD
+/// Mean number of SPADs in a period that [`draw_counts`] has to follow one by one, of `spads` in all laser cycles, with `photons` on a SPAD
 /// in it at most.
 pub(super) fn looked_at(blindness: &Blindness, photons: f64, spads: u64) -> f64 {
     spads as f64 * blindness.memory() as f64 * photons * photons
@@ -249,7 +249,7 @@ const FEW: usize = 2 * LANES;
 fn fired_before(ages: &Ages, spads: u64, random: &mut RandomWords) -> SmallVec<[u64; FEW]> {
     let (mut left, mut share_left) = (spads, 1.0);
     let aged = ages.aged.iter().map(|&share| {
-        let p = Ages::among(share, share_left);
+        let p = Ages::conditional_share(share, share_left);
         let count = binomial(left, p, 1.0 - p, random);
         left -= count;
         share_left -= share;
@@ -332,11 +332,11 @@ impl<'a> Pool<'a> {
         let (mut few, mut many): ([_; 1], SmallVec<[[f64; VECTOR]; 4]>);
         let missed = if groups <= VECTOR {
             few = [[0.0; VECTOR]];
-            self.meet(overlap, candidates, &mut few, random);
+            self.draw_missed(overlap, candidates, &mut few, random);
             few.as_flattened()
         } else {
             many = smallvec![[0.0; VECTOR]; groups.div_ceil(VECTOR)];
-            self.meet(overlap, candidates, &mut many, random);
+            self.draw_missed(overlap, candidates, &mut many, random);
             many.as_flattened()
         };
         let mut without_pulse = self.idle - count(missed[0]);
@@ -347,7 +347,7 @@ impl<'a> Pool<'a> {
             let met = *fired - count(missed[1] - missed[0]);
             others -= met;
             for _ in 0..met {
-                let able = blindness.able(first, memory - step);
+                let able = blindness.firing_probability(first, memory - step);
                 let pulses = able > 0.0 && random.coarse() < able;
                 if pulses || blindness.law == DeadTimeLaw::Paralysable {
                     renewed[0] += 1;
@@ -366,7 +366,7 @@ impl<'a> Pool<'a> {
     /// Sets `missed` to how many SPADs are not met in this period: first the surely blind ones, then those and the oldest
     /// of the others, and so on to the youngest.
     #[inline(always)]
-    fn meet(
+    fn draw_missed(
         &self,
         overlap: &Overlap,
         candidates: u64,
@@ -380,6 +380,6 @@ impl<'a> Pool<'a> {
             *group = real(up_to);
             up_to += fired.next().unwrap_or(&0);
         }
-        overlap.meet(candidates, missed, random);
+        overlap.draw_marked(candidates, missed, random);
     }
 }

@@ -113,7 +113,7 @@ impl Secondaries {
     /// What `ready` SPADs and those `returning` do in a cell, with its photons on each SPAD and `crossing` avalanches
     /// that come from others: what is ready afterwards, the pulses, by whether a carrier stays trapped, and
     /// avalanches that are no pulse of their own.
-    pub(super) fn act(
+    pub(super) fn advance_cell(
         &self,
         photons: &HazardCell,
         crossing: f64,
@@ -197,7 +197,7 @@ impl Acts {
         }
     }
 
-    pub(super) fn seen(&self) -> f64 {
+    pub(super) fn pulse_sum(&self) -> f64 {
         self.pulses[0] + self.pulses[1]
     }
 }

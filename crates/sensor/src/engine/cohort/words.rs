@@ -83,7 +83,7 @@ impl RandomWords {
 
     /// A whole number below `n` > 0; uneven by less than n/2⁶⁴.
     #[inline(always)]
-    pub(super) fn below(&mut self, n: u64) -> u64 {
+    pub(super) fn whole_below(&mut self, n: u64) -> u64 {
         let [high, low] = self.next_words().map(u128::from);
         (((high << 32 | low) * u128::from(n)) >> 64) as u64
     }

@@ -65,7 +65,7 @@ pub struct Cycle {
     machine: OnceLock<Result<Machine, Unlevelled>>,
 }
 
-/// Pulses, sorted for [`Cycle::run`].
+/// Pulses, sorted for [`Cycle::replay_packed`].
 pub struct PackedPulses {
     /// Macropixels of each block, by their index in the caller's order.
     blocks: Vec<(Vec<usize>, Packed)>,
@@ -135,7 +135,7 @@ impl Cycle {
         self.clocked().div_ceil(PERIODS)
     }
 
-    /// Sorts pulses (one list per macropixel, by time) for [`Cycle::run`].
+    /// Sorts pulses (one list per macropixel, by time) for [`Cycle::replay_packed`].
     pub fn pack(&self, starts: &[u16], pulses: &[&[SpadEvent]]) -> PackedPulses {
         let mut order: Vec<usize> = (0..starts.len()).collect();
         // Counters that start alike open their windows, and come to rest, together.

@@ -102,7 +102,7 @@ impl Orders {
             law: WindowLaw::with_timing(&setting.sensor, &setting.exposure, timing),
             shift: delays.macropixel.shift.clone(),
             latency: rises.map(|&(rise, _)| rise).collect(),
-            doubt: always(setting, delays),
+            doubt: common_doubt(setting, delays),
             counter_clk: counter.map_or(Time::ZERO, |c| c.counter_clk.0),
             reset: delays.macropixel.reset.1,
         }
@@ -258,7 +258,7 @@ fn guided(setting: &Setting, delays: &Delays, counter: &CounterDelays) -> ChipTi
 }
 
 /// The first thing in doubt for every start value.
-fn always(setting: &Setting, delays: &Delays) -> Option<Doubt> {
+fn common_doubt(setting: &Setting, delays: &Delays) -> Option<Doubt> {
     let (config, exposure, schedule) = (&setting.sensor, &setting.exposure, setting.schedule);
     let (strobe, hit_release) = (delays.strobe(), delays.hit_release());
     let counter = delays.counter.as_ref();

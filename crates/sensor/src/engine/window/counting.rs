@@ -135,7 +135,7 @@ impl GroupDraws {
             Photon::new(
                 stream.cycle_start(cycle) + Time::from_fs(time_fs),
                 spad,
-                light.breeds(),
+                light.has_secondaries(),
             )
         };
         let own = self
@@ -362,7 +362,7 @@ impl<'a> Counting<'a> {
             }
         }
         self.tables
-            .put(&self.codes, group.cycles() as usize, counted);
+            .put_group(&self.codes, group.cycles() as usize, counted);
         if pixel.breeding.is_some() {
             self.count_breeding_cycles(pixel, group);
         }
@@ -387,7 +387,7 @@ impl<'a> Counting<'a> {
         } else {
             carried[photon - self.first_code[1]].1
         };
-        Time::from_fs(time_fs) - self.before(laser_cycle)
+        Time::from_fs(time_fs) - self.previous_cycle_length(laser_cycle)
     }
 
     /// Whether a photon, perhaps of the echo, is one of those drawn.
@@ -440,7 +440,7 @@ impl<'a> Counting<'a> {
     }
 
     /// How long before a laser cycle the one before it starts.
-    fn before(&self, laser_cycle: u32) -> Time {
+    fn previous_cycle_length(&self, laser_cycle: u32) -> Time {
         let start = |cycle| self.stream.cycle_start(cycle);
         start(laser_cycle) - start(laser_cycle - 1)
     }
@@ -449,7 +449,7 @@ impl<'a> Counting<'a> {
 impl Pixel<'_> {
     /// What is drawn of a part of the light.
     fn spans(&self, part: &PixelStream<'_>) -> &Spans {
-        if part.breeds() {
+        if part.has_secondaries() {
             &self.sight.breeding
         } else {
             &self.sight.plain
@@ -458,7 +458,7 @@ impl Pixel<'_> {
 
     /// Whether avalanches cause others.
     fn has_secondaries(&self) -> bool {
-        self.parts.iter().any(PixelStream::breeds)
+        self.parts.iter().any(PixelStream::has_secondaries)
     }
 
     /// Whether windows see no echo of another cycle than their own.

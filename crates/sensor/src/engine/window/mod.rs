@@ -71,7 +71,7 @@ impl Window {
             self.count_pulses(pulses, window, &mut hits);
             let seen = cancelling
                 .as_ref()
-                .map(|cancelling| cancelling.seen(pixel.start, pulses));
+                .map(|cancelling| cancelling.cancelled_pulses(pixel.start, pulses));
             cancelled += seen.unwrap_or(0);
         };
         // Pulses that the next ones may share a bin with.

@@ -73,7 +73,7 @@ impl<'a> Past<'a> {
         let mut push = |cycle: u32, (_, time_fs, spad): PastPhoton| {
             let time = start(cycle) + Time::from_fs(time_fs);
             if time >= Time::ZERO && spads >> spad & 1 != 0 {
-                photons.push(Photon::new(time, spad, light.breeds()));
+                photons.push(Photon::new(time, spad, light.has_secondaries()));
             }
         };
         for photon in draws.photons(light, part, self.cycle, What::Slot(self.slot)) {

@@ -76,7 +76,7 @@ impl Table {
 
     /// Puts a photon.
     #[inline]
-    pub(super) fn put(&mut self, row: usize, place: u32) {
+    pub(super) fn put_photon(&mut self, row: usize, place: u32) {
         let (at, bit) = ((place / WORD) as usize, 1 << (place % WORD));
         let word = &mut self.words[row * ROW + at];
         self.doubt[at] |= *word & bit;

@@ -71,7 +71,7 @@ impl DetectorDescription {
     pub fn detector(&self, bins: usize) -> Result<Detector, BadDetector> {
         let edges_s = self.edges_s(bins)?;
         let fwhm_ns = needed("pulse_fwhm_ns", self.pulse_fwhm_ns)?;
-        within("pulse_fwhm_ns", fwhm_ns, (0.0, 1e6))?;
+        check_within("pulse_fwhm_ns", fwhm_ns, (0.0, 1e6))?;
         let all_ns = 1e9 * (edges_s[bins] - edges_s[0]);
         if fwhm_ns > 0.5 * all_ns * (1.0 + 1e-9) {
             let message = format!(
@@ -111,9 +111,9 @@ impl DetectorDescription {
     fn edges_s(&self, bins: usize) -> Result<Vec<f64>, BadDetector> {
         let Some(edges_ns) = &self.bin_edges_ns else {
             let bin_ns = needed("bin_width_ns", self.bin_width_ns)?;
-            within("bin_width_ns", bin_ns, (1e-3, 1e6))?;
+            check_within("bin_width_ns", bin_ns, (1e-3, 1e6))?;
             let start_ns = self.start_ns.unwrap_or(0.0);
-            within("start_ns", start_ns, (-1e9, 1e9))?;
+            check_within("start_ns", start_ns, (-1e9, 1e9))?;
             return Ok(Detector::equal_edges_s(
                 bins,
                 1e-9 * start_ns,
@@ -166,9 +166,9 @@ fn checked(coincidence: DescribedCoincidence) -> Result<Coincidence, BadDetector
         within_ns,
         of,
     } = coincidence;
-    within("coincidence.within_ns", within_ns, (1e-3, 1e6))?;
-    within("coincidence.of", f64::from(of), (1.0, 1024.0))?;
-    within("coincidence.spads", f64::from(spads), (1.0, f64::from(of)))?;
+    check_within("coincidence.within_ns", within_ns, (1e-3, 1e6))?;
+    check_within("coincidence.of", f64::from(of), (1.0, 1024.0))?;
+    check_within("coincidence.spads", f64::from(spads), (1.0, f64::from(of)))?;
     Ok(Coincidence {
         spads,
         within_s: 1e-9 * within_ns,
@@ -187,7 +187,11 @@ fn needed(key: &'static str, value: Option<f64>) -> Result<f64, BadDetector> {
     value.ok_or_else(|| bad(key, "is needed to make depths of bins; give it"))
 }
 
-fn within(key: &'static str, value: f64, (least, most): (f64, f64)) -> Result<(), BadDetector> {
+fn check_within(
+    key: &'static str,
+    value: f64,
+    (least, most): (f64, f64),
+) -> Result<(), BadDetector> {
     if (least..=most).contains(&value) {
         return Ok(());
     }

@@ -126,7 +126,7 @@ proptest! {
         for (x, y) in at {
             // The file's y is up.
             let ray = Ray { origin: DVec3::new(x, -y, 0.0), direction: DVec3::Z };
-            prop_assert_eq!(mesh.meet(&ray).is_some(), is_within(&outline, [x, y]));
+            prop_assert_eq!(mesh.intersect(&ray).is_some(), is_within(&outline, [x, y]));
         }
     }
 }
@@ -172,7 +172,7 @@ fn a_cube_of_quadrangles_is_a_box() {
             f64::from(number / 50) / 40.0 - 0.5,
         );
         let ray = Ray::new(DVec3::ZERO, DVec3::new(0.9 * x, 0.5 * y, 1.0));
-        match (mesh.meet(&ray), cuboid.meet(&ray)) {
+        match (mesh.intersect(&ray), cuboid.intersect(&ray)) {
             (Some(a), Some(b)) => {
                 assert!((a.range_m - b.range_m).abs() < 1e-5);
                 let normals = [
@@ -225,7 +225,7 @@ fn texture_coordinates_come_from_the_file() {
     let mesh = read(text).unwrap();
     for (x, y) in [(0.25, 0.125), (0.75, 0.875), (0.5, 0.5)] {
         let ray = Ray::new(DVec3::new(x, y, -3.0), DVec3::Z);
-        let Meeting { range_m, part } = mesh.meet(&ray).unwrap();
+        let Meeting { range_m, part } = mesh.intersect(&ray).unwrap();
         let (u, v) = mesh.on_surface(ray.point(range_m), part);
         assert!(
             (u - 2.0 * x).abs() < 1e-6 && (v - y).abs() < 1e-6,
@@ -280,7 +280,7 @@ proptest! {
             let away = if number % 4 == 0 { DVec3::new(y, z, x) * 0.3 } else { DVec3::new(y, z, x).normalize() * far };
             let origin = mesh.middle + away;
             let ray = Ray::new(origin, aim - origin);
-            let found = mesh.meet(&ray).map(|m| (m.range_m, mesh.numbers[m.part as usize]));
+            let found = mesh.intersect(&ray).map(|m| (m.range_m, mesh.numbers[m.part as usize]));
             prop_assert_eq!(found, meet_all(&mesh, &ray));
         }
     }
@@ -307,7 +307,7 @@ fn corners_far_from_the_origin_keep_their_millimetres() {
         origin,
         direction: DVec3::Z,
     };
-    let met = mesh.meet(&ray).unwrap();
+    let met = mesh.intersect(&ray).unwrap();
     assert!((met.range_m - 10.0).abs() < 1e-6, "{}", met.range_m);
     assert_eq!(mesh.numbers[met.part as usize], 1);
 }

@@ -66,7 +66,7 @@ struct Ahead {
 
 impl Tree {
     /// Over triangles with these bounds, and the order in which it keeps them.
-    pub(super) fn over(bounds: &[Bounds]) -> (Self, Vec<u32>) {
+    pub(super) fn build(bounds: &[Bounds]) -> (Self, Vec<u32>) {
         let params = BvhBuildParams::fast_build();
         let narrow = build_bvh2(bounds, params, &mut std::time::Duration::default());
         let mut nodes = vec![EMPTY];

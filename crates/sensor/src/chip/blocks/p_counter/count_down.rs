@@ -175,7 +175,7 @@ impl<'n> CountDown<'n> {
             let word = lanes.fold(0, |word, (lane, code)| {
                 word | u64::from(code >> bit & 1) << lane
             });
-            (net, Lanes::known(word))
+            (net, Lanes::from_bits(word))
         });
         let bits: Vec<_> = bits.collect();
         self.drive(&bits, u64::MAX);
@@ -261,5 +261,5 @@ impl<'n> CountDown<'n> {
 }
 
 fn all(value: bool) -> Lanes {
-    Lanes::known(if value { u64::MAX } else { 0 })
+    Lanes::from_bits(if value { u64::MAX } else { 0 })
 }

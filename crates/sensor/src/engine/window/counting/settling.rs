@@ -75,8 +75,8 @@ impl Counting<'_> {
 
     /// The last photon of the same cycle before this one that is like that.
     fn find_before(&self, photon: usize, is_like: impl Fn(Code) -> bool) -> Option<(usize, Code)> {
-        let before = std::iter::successors(self.tables.before(photon), |&photon| {
-            self.tables.before(photon)
+        let before = std::iter::successors(self.tables.previous_photon(photon), |&photon| {
+            self.tables.previous_photon(photon)
         });
         before
             .map(|photon| (photon, self.codes.codes()[photon]))
@@ -98,7 +98,7 @@ impl Counting<'_> {
             }
             once |= spad;
             self.together.push((photon, code));
-            next = self.tables.before(photon);
+            next = self.tables.previous_photon(photon);
         }
         let work = pixel.work;
         let mut left = several;

@@ -147,7 +147,7 @@ impl Tabling<'_> {
                     let may = edges.iter().filter(|edge| at >= edge[0]).count();
                     let must = edges.iter().filter(|edge| at >= edge[1]).count();
                     if may == must {
-                        self.put(passed + must, place, kept);
+                        self.put_photon(passed + must, place, kept);
                     } else {
                         let (cycle, _) = self.split(place);
                         let own_fs = slots.time_fs(run.slot, word);
@@ -161,8 +161,8 @@ impl Tabling<'_> {
     }
 
     #[inline]
-    fn put(&mut self, row: usize, place: u32, kept: &mut TableScratch) {
-        kept.table.put(row, place);
+    fn put_photon(&mut self, row: usize, place: u32, kept: &mut TableScratch) {
+        kept.table.put_photon(row, place);
         self.seen += u64::from(self.is_in_bins(row));
     }
 
@@ -180,7 +180,7 @@ impl Tabling<'_> {
             let window = counting.window(pixel.sight, self.group.first_cycle() + cycle);
             self.exact_row(&window, time_fs)
         });
-        self.put(row, place, kept);
+        self.put_photon(row, place, kept);
     }
 
     /// The row of a photon in the window of a laser cycle.
@@ -243,7 +243,7 @@ impl Counting<'_> {
     fn moved_fs(&self, laser_cycle: u32, later: u32) -> i64 {
         match later {
             0 => 0,
-            _ => self.before(laser_cycle).as_fs(),
+            _ => self.previous_cycle_length(laser_cycle).as_fs(),
         }
     }
 
@@ -309,7 +309,7 @@ impl Counting<'_> {
             pixel.work.pulses += pulses;
             pixel.work.lost_to_dead_time += tabling.seen.saturating_sub(pulses);
             for (part, drawn) in parts.iter().zip(&mut kept.drawn) {
-                if !part.breeds() {
+                if !part.has_secondaries() {
                     drawn.carry(part, group);
                 }
             }
@@ -338,7 +338,7 @@ impl Counting<'_> {
         for (number, part) in parts.iter().enumerate() {
             let first = group.first_cycle();
             let spans = pixel.spans(part);
-            if part.breeds() {
+            if part.has_secondaries() {
                 let layer = &mut self.layers[number];
                 pixel.work.photons_drawn += layer.draw(part, self.stream, first, spans);
                 let photons = layer.of_group(group).iter();
@@ -431,7 +431,7 @@ impl Counting<'_> {
         let from = start + Time::from_fs(pixel.sight.plain.from_fs);
         let until = start + Time::from_fs(pixel.sight.until_fs);
         let is_seen = |time: Time| time >= from && time < until;
-        let light = pixel.parts.iter().find(|part| part.breeds());
+        let light = pixel.parts.iter().find(|part| part.has_secondaries());
         is_seen(photon.time)
             || light.is_some_and(|light| light.children(photon).any(|child| is_seen(child.time)))
     }

@@ -103,7 +103,7 @@ impl Counting<'_> {
                         let photon = Photon::new(
                             self.stream.cycle_start(cycle) + Time::from_fs(time_fs),
                             spad,
-                            light.breeds(),
+                            light.has_secondaries(),
                         );
                         by_cycle.push(((window - of_windows.start) as u32, photon));
                     }
@@ -153,7 +153,7 @@ impl Counting<'_> {
                 let time = start + self.time_of(pixel.light, photon, laser_cycle);
                 self.photons.push(Photon::new(time, code.spad(), false));
             }
-            next = self.tables.before(photon);
+            next = self.tables.previous_photon(photon);
         }
     }
 
@@ -207,7 +207,7 @@ impl Counting<'_> {
     /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
     /// rising edges in the window of a laser cycle, and perhaps some before.
     pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, window: &CycleWindow<'_>, spads: u64) {
-        let (wanted_from, until) = (window.wanted_from(), window.until());
+        let (wanted_from, until) = (window.wanted_from(), window.end());
         let past = |part| pixel.spans(part).past(self.stream, window.laser_cycle);
         let mut pasts: SmallVec<[Past<'_>; 2]> = pixel.parts.iter().map(past).collect();
         loop {
@@ -289,7 +289,7 @@ impl ByWindow {
                 let photon = Photon::new(
                     stream.cycle_start(cycle) + Time::from_fs(time_fs),
                     spad,
-                    light.breeds(),
+                    light.has_secondaries(),
                 );
                 self.photons.push((cycle + later, photon));
             }

@@ -42,7 +42,7 @@ impl Tabling<'_> {
             found
         };
         for ((part, drawn), echo) in pixel.parts.iter().zip(&*drawn).zip(&*echoes) {
-            if part.breeds() {
+            if part.has_secondaries() {
                 continue;
             }
             for (draw, later) in [(&drawn.own, 0), (&drawn.previous, 1)] {
