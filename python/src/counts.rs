@@ -49,9 +49,9 @@ pub(crate) fn range_counts<'py>(
         let profile = calibration
             .map(|path| read_calibration(&path, &sensor))
             .transpose()?;
-        let of = (&sensor, &exposure);
+        let chip = (&sensor, &exposure);
         Ok(system::range_counts(
-            of,
+            chip,
             &world,
             &options,
             profile.as_ref(),

@@ -37,8 +37,9 @@ impl FrameRecord {
         let report = move || {
             let silicon = Silicon::new(&settings.sensor);
             let timing = TimingVerdict::analyse(&settings.sensor, &silicon, (0, 0)).report();
-            let of = (&request, &settings, &timing, &frame);
-            let report = FrameReport::<()>::new(scene_name, of.0, of.1, of.2, of.3, None);
+            let parts = (&request, &settings, &timing, &frame);
+            let report =
+                FrameReport::<()>::new(scene_name, parts.0, parts.1, parts.2, parts.3, None);
             let text = |json: serde_json::Result<String>| json.expect("a report is JSON");
             let configuration = serde_json::to_string(&report.configuration);
             (text(serde_json::to_string(&report)), text(configuration))

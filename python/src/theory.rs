@@ -92,9 +92,9 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
     Ok(match name {
         "detection_probability" => {
             let model = model(word(0))?;
-            let of =
+            let probability =
                 move |r: &[f64]| detection::probability(&light(r), r[3] as u64, model).probability;
-            (4, boxed(of))
+            (4, boxed(probability))
         }
         "miss_probability" => {
             let model = model(word(0))?;

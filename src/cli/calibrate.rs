@@ -110,19 +110,19 @@ fn table(found: &BinCalibration) -> Table {
         let lengths: Vec<f64> = lengths.map(|s| s * 1e12).collect();
         let (mean, sigma) = mean_and_sigma(&lengths);
         let bound = |f: fn(f64, f64) -> f64| lengths.iter().copied().reduce(f).unwrap_or(mean);
-        let of = format!("{name} windows");
+        let row_name = format!("{name} windows");
         let windows = match found.windows[line] {
             1 => "1 window".to_owned(),
             windows => format!("mean of {windows} windows"),
         };
-        table.push(&of, format!("{} bins, {windows}", lengths.len()));
+        table.push(&row_name, format!("{} bins, {windows}", lengths.len()));
         table.push(
-            format!("{of}, length"),
+            format!("{row_name}, length"),
             format!("{mean:.1} ps, σ {sigma:.1} ps"),
         );
         let (least, most) = (bound(f64::min), bound(f64::max));
         table.push(
-            format!("{of}, least and most"),
+            format!("{row_name}, least and most"),
             format!("{least:.0} and {most:.0} ps"),
         );
     }

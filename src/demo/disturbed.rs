@@ -255,10 +255,10 @@ mod tests {
         };
         let outcomes = disturbance.outcomes(&demonstrator, 1, || ()).unwrap();
         let wrong = |case: &str, scheme: &str| {
-            let mut of = outcomes
+            let mut matching = outcomes
                 .iter()
                 .filter(|o| o.case == case && o.scheme == scheme);
-            of.next().unwrap().wrong[0]
+            matching.next().unwrap().wrong[0]
         };
         assert!(wrong("still", "full") > 0.2, "{outcomes:#?}");
         assert!(wrong("still", "sliding") > 0.2);
@@ -268,10 +268,10 @@ mod tests {
         assert!(wrong("still", "guided") < 0.05);
         // A bin of the guided chip's memory for 27 of a full histogram.
         let lost = |scheme: &str| {
-            let of = outcomes
+            let outcome = outcomes
                 .iter()
                 .find(|o| o.case == "we wait" && o.scheme == scheme);
-            of.unwrap().lost[0]
+            outcome.unwrap().lost[0]
         };
         let with_depth = [1.0 - lost("full"), 1.0 - lost(EQUAL_SILICON)];
         assert!(

@@ -190,10 +190,10 @@ mod tests {
             let low = points.iter().filter(|point| point[2] < 31.6).count();
             assert!((28..=36).contains(&low), "{design}: {low}");
             for threshold in 1..=4 {
-                let of = points
+                let with_threshold = points
                     .iter()
                     .filter(|point| point[1] == f64::from(threshold));
-                assert_eq!(of.count(), 16, "{design}");
+                assert_eq!(with_threshold.count(), 16, "{design}");
             }
         }
     }

@@ -381,8 +381,8 @@ fn of_every_endpoint_of_a_macropixel() {
                     assert!(*check == "hold" && (theirs.own || by_arrival), "{both}");
                     2
                 };
-                let of = (*check, theirs.is_plain);
-                counted.entry(of).or_default()[more] += 1;
+                let check_and_kind = (*check, theirs.is_plain);
+                counted.entry(check_and_kind).or_default()[more] += 1;
                 let longer = theirs.halves - ours.halves;
                 match *check {
                     "recovery" | "removal" => {}
@@ -394,8 +394,8 @@ fn of_every_endpoint_of_a_macropixel() {
         }
         println!("{name}: {counted:?}");
         let sum = |which: usize, is_plain: bool| {
-            let of = counted.iter().filter(|(key, _)| key.1 == is_plain);
-            of.map(|(_, counts)| counts[which]).sum::<usize>()
+            let entries = counted.iter().filter(|(key, _)| key.1 == is_plain);
+            entries.map(|(_, counts)| counts[which]).sum::<usize>()
         };
         let [divided, plain] =
             [false, true].map(|is_plain| [0, 1, 2].map(|which| sum(which, is_plain)));

@@ -368,10 +368,14 @@ fn the_top_has_the_name_of_the_chip_and_a_fast_clk_is_told() {
         let small = ["--rows", "1", "--cols", "1", "--set"];
         for (clk, is_told) in [("200e6", false), ("201e6", name == "hslidar")] {
             let clk = format!("sensor.clk_hz={clk}");
-            let of = ["--sensor", sensor].into_iter().chain(small).chain([&*clk]);
-            let of: Vec<&str> = of.collect();
-            let sdf = [&["export", "sdf", "--out", "chip.sdf"], &of[..]].concat();
-            let verilog = [&["export", "verilog", "--out", "v"], &of[..]].concat();
+            let sensor_words = ["--sensor", sensor].into_iter().chain(small).chain([&*clk]);
+            let sensor_arguments: Vec<&str> = sensor_words.collect();
+            let sdf = [
+                &["export", "sdf", "--out", "chip.sdf"],
+                &sensor_arguments[..],
+            ]
+            .concat();
+            let verilog = [&["export", "verilog", "--out", "v"], &sensor_arguments[..]].concat();
             for arguments in [sdf, verilog] {
                 let exported = gdtof(here, &arguments);
                 assert!(exported.status.success(), "{exported:?}");

@@ -49,8 +49,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     };
     let shape = [sensor.rows, sensor.cols, sensor.bins];
     let counts = read_counts(&args.histograms, &shape)?;
-    let of = (sensor, &taken.settings.exposure);
-    check_counts(args.histograms.display(), of, &counts)?;
+    let chip = (sensor, &taken.settings.exposure);
+    check_counts(args.histograms.display(), chip, &counts)?;
     let ranged = taken.range(&counts, &options, calibration.as_ref())?;
     if let Some(path) = &args.out {
         write_csv(path, sensor.cols, &ranged)?;

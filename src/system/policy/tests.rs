@@ -1,3 +1,5 @@
+//! Windows from guides, and the search for targets that a guide has missed.
+
 use std::sync::Arc;
 
 use super::*;

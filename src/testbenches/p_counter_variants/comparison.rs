@@ -248,7 +248,7 @@ impl Activity {
         let local_stop = probes.net(Probe::LocalStop);
         let compares = config.p_counter == PCounter::Comparator;
         let equal = compares.then(|| pin(config.p_counter.row().nets[0]));
-        let mut of = Activity {
+        let mut activity = Activity {
             counts,
             changes: 0,
             glitches: 0,
@@ -264,18 +264,18 @@ impl Activity {
             let mut changes = vec![0usize; netlist.net_count()];
             for &(time, net, _) in all[from..until].iter().filter(|c| !inputs.contains(&c.1)) {
                 changes[net.index()] += 1;
-                of.settled = of.settled.max(time - within.start);
+                activity.settled = activity.settled.max(time - within.start);
             }
             let extra = |net: NetId| changes[net.index()] / 2 * 2;
-            of.changes += changes.iter().sum::<usize>();
-            of.glitches += (0..changes.len())
+            activity.changes += changes.iter().sum::<usize>();
+            activity.glitches += (0..changes.len())
                 .map(|net| extra(NetId::new(net)))
                 .sum::<usize>();
-            of.on_local_stop += extra(local_stop);
-            if let (Some(on_equal), Some(equal)) = (&mut of.on_equal, equal) {
+            activity.on_local_stop += extra(local_stop);
+            if let (Some(on_equal), Some(equal)) = (&mut activity.on_equal, equal) {
                 *on_equal += extra(equal);
             }
         }
-        of
+        activity
     }
 }

@@ -58,8 +58,9 @@ impl<'g, 't> Candidate<'g, 't> {
         let area = group.number("area")?.unwrap_or(0.0);
         let pins = || group.pins();
         let of_direction = |direction: &str| {
-            let of = pins().filter(|(_, pin)| pin.value("direction") == Some(direction));
-            of.map(|(name, _)| name).collect::<Vec<_>>()
+            let pins_of_direction =
+                pins().filter(|(_, pin)| pin.value("direction") == Some(direction));
+            pins_of_direction.map(|(name, _)| name).collect::<Vec<_>>()
         };
         let (mut inputs, outputs) = (of_direction("input"), of_direction("output"));
         // In one order in every drive of a family, whatever the file's is.
@@ -319,12 +320,8 @@ impl CellModel {
             groups.next().map_or(Ok(Table::fixed(0.0)), read)
         };
         if let (Ok(rise), Ok(fall)) = (table("rise_power"), table("fall_power")) {
-            let of = [rise, fall];
-            self.energies.push(CellEnergy {
-                to,
-                from,
-                tables: of,
-            });
+            let tables = [rise, fall];
+            self.energies.push(CellEnergy { to, from, tables });
         } else {
             self.remark(Remark::Energy);
         }

@@ -179,13 +179,13 @@ fn wanted(expected: &str) -> (String, String) {
         _ if list.iter().any(|of| expected.starts_with(of)) => {
             let is_digit = |c: char| c.is_ascii_digit();
             let mut words = expected.split(' ');
-            let of = words.find(|word| word.chars().all(is_digit));
+            let list_length = words.find(|word| word.chars().all(is_digit));
             let numbers = if expected.contains("f64") {
                 " numbers"
             } else {
                 ""
             };
-            let length = of.map_or(String::new(), |of| format!(" of {of}{numbers}"));
+            let length = list_length.map_or(String::new(), |of| format!(" of {of}{numbers}"));
             (format!("a list{length}"), String::new())
         }
         _ => match (

@@ -20,11 +20,11 @@ pub fn schema(title: &str, sections: &[Section], values: &Table) -> Value {
         let nothing = Table::new();
         let value = values.get(section.name);
         let is_list = value.is_none_or(toml::Value::is_array);
-        let of = value.and_then(toml::Value::as_table).unwrap_or(&nothing);
+        let section_values = value.and_then(toml::Value::as_table).unwrap_or(&nothing);
         let table = json!({
             "type": "object",
             "description": section.what,
-            "properties": keys(section.keys, of),
+            "properties": keys(section.keys, section_values),
             "additionalProperties": false,
         });
         let table = if is_list {

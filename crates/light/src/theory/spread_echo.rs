@@ -332,9 +332,9 @@ mod tests {
     fn its_places_are_enough() {
         for (sigma, error) in [(0.05, 5e-3), (0.3, 1e-4), (0.9, 5e-3), (1.9, 5e-3)] {
             let echo = echo(0.05, 0.05, sigma);
-            let of =
+            let detection_at =
                 |k: u32| echo.at_place(8.0 + (f64::from(k) + 0.5) / 512.0, 100, Hits::OneACycle);
-            let many = (0..256).map(|k| of(k).0).sum::<f64>() / 256.0;
+            let many = (0..256).map(|k| detection_at(k).0).sum::<f64>() / 256.0;
             let found = echo.detection(100, Hits::OneACycle).probability;
             assert!((found - many).abs() < error, "{sigma}: {found} {many}");
         }

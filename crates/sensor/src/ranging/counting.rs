@@ -120,16 +120,17 @@ impl Counting {
         if children <= 0.0 || n == 0 {
             return (f64::from(u8::from(self.counts(n))), 0.0);
         }
-        let of = n as i32;
+        let avalanches = n as i32;
         let (mut holds, mut slope) = (0.0, 0.0);
         let mut ways = 1.0;
-        for k in 0..=of {
+        for k in 0..=avalanches {
             if self.counts((n + k as usize).min(self.spads)) {
-                let chance = ways * children.powi(k) * (1.0 - children).powi(of - k);
+                let chance = ways * children.powi(k) * (1.0 - children).powi(avalanches - k);
                 holds += chance;
-                slope += chance * (f64::from(k) / children - f64::from(of - k) / (1.0 - children));
+                slope += chance
+                    * (f64::from(k) / children - f64::from(avalanches - k) / (1.0 - children));
             }
-            ways *= f64::from(of - k) / f64::from(k + 1);
+            ways *= f64::from(avalanches - k) / f64::from(k + 1);
         }
         (holds, slope)
     }

@@ -91,8 +91,8 @@ impl OwnBlock {
         let module = Module::from_yosys_of(&text, top, library);
         let module = module.map_err(|e| format!("{}: {e}", file.display()))?;
         // What cells of a library do, the library says.
-        let of = library.map_or(String::new(), |library| library.name.clone());
-        *self = OwnBlock::from_module(asked, module, &(text + &of));
+        let library_name = library.map_or(String::new(), |library| library.name.clone());
+        *self = OwnBlock::from_module(asked, module, &(text + &library_name));
         Ok(())
     }
 

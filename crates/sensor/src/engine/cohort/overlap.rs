@@ -100,12 +100,17 @@ mod tests {
             let trials = 50_000;
             let mut seen = vec![0u32; draws.min(marked) as usize + 1];
             let mut in_first = 0.0;
-            let of = Overlap::new(total, draws, bound);
+            let overlap = Overlap::new(total, draws, bound);
             for _ in 0..trials {
-                let candidates = binomial(draws, of.candidate, 1.0 - of.candidate, &mut random);
+                let candidates = binomial(
+                    draws,
+                    overlap.candidate,
+                    1.0 - overlap.candidate,
+                    &mut random,
+                );
                 let half = (marked / 2) as f64;
                 let mut groups = [[half, marked as f64, marked as f64, marked as f64]];
-                of.draw_marked(candidates, &mut groups, &mut random);
+                overlap.draw_marked(candidates, &mut groups, &mut random);
                 let [[first, all, ..]] = groups;
                 let met = marked - all as u64;
                 in_first += half - first;
@@ -142,7 +147,7 @@ mod tests {
                 let error = 5.0 * (expected + 1.0).sqrt();
                 assert!(
                     (f64::from(count) - expected).abs() < error,
-                    "{of:?}, {marked}, {k}: {count} {expected}"
+                    "{overlap:?}, {marked}, {k}: {count} {expected}"
                 );
             }
         }
