@@ -37,13 +37,13 @@ const DEPTH_SIGMA_M: f64 = 0.1;
 
 /// How a guide's claims have been kept.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Kept {
+struct GuideErrors {
     targets: usize,
     /// Error over the standard deviation claimed, of all that have an estimate, and the error, m.
     errors: Vec<(f64, f64)>,
 }
 
-impl Kept {
+impl GuideErrors {
     /// Share of the estimates whose target is within `sigmas` standard deviations as claimed.
     fn share_within(&self, sigmas: f64) -> f64 {
         let inside = self.errors.iter().filter(|(size, _)| *size <= sigmas);
@@ -88,10 +88,10 @@ impl Kept {
 ///
 /// # Panics
 /// When there is no such guide.
-fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<Kept, GuideError> {
+fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<GuideErrors, GuideError> {
     let looks_back = guide.contains("kalman");
     let guide = options::parse_all(guide.split('+'), "guide").expect("a guide");
-    let mut all = Kept::default();
+    let mut all = GuideErrors::default();
     for frame in 0..frames {
         let (now_s, seed) = (f64::from(frame), u64::from(frame));
         let now = scene.snapshot(now_s);

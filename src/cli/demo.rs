@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::voice::{announce, notes, progress, say_unless_quiet};
-use crate::demo::disturbed::{Disturbance, Outcome};
+use crate::demo::disturbed::{Disturbance, DisturbanceOutcome};
 use crate::demo::show::{Show, ShowResult};
 use crate::demo::{Demonstrator, limit, shows, sweep};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
@@ -274,7 +274,11 @@ fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String
 }
 
 /// What a disturbance costs each scheme.
-fn write_disturbed(folder: &Path, name: &str, outcomes: &[Outcome]) -> anyhow::Result<String> {
+fn write_disturbed(
+    folder: &Path,
+    name: &str,
+    outcomes: &[DisturbanceOutcome],
+) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(outcomes)?;
     OutputFile::write_text(&folder.join("outcomes.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(&format!(

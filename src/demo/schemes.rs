@@ -33,7 +33,7 @@ const ZOOM_BINS_S: [f64; 2] = [166e-9, 20.8e-9];
 
 /// What a scheme makes of a target.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub(crate) struct Outcome {
+pub(crate) struct SchemeOutcome {
     /// The scheme.
     pub(crate) scheme: &'static str,
     /// Bins that each macropixel needs at once.
@@ -64,7 +64,7 @@ pub(crate) fn compare(
     guide: &GuideMap,
     pixels: &[usize],
     seed: u64,
-) -> Result<Vec<Outcome>, FrameError> {
+) -> Result<Vec<SchemeOutcome>, FrameError> {
     let sensor = &demonstrator.sensor;
     let truth = GroundTruth::render(world, sensor.rows as u32, sensor.cols as u32);
     let bench = Bench {
@@ -101,7 +101,7 @@ pub(crate) fn compare(
     let full = windows(cycles, false)?;
     let sliding = windows((cycles / starts.len() as u32).max(1), true)?;
     let zooming = bench.zoom(cycles / 3)?;
-    let outcome = |scheme, bins, exposures, depths: Vec<PixelDepth>| Outcome {
+    let outcome = |scheme, bins, exposures, depths: Vec<PixelDepth>| SchemeOutcome {
         scheme,
         bins,
         exposures,

@@ -3,7 +3,7 @@
 use super::Demonstrator;
 use super::found::TargetSummary;
 use super::panel::Panel;
-use super::schemes::{self, Outcome};
+use super::schemes::{self, SchemeOutcome};
 use crate::report::CloudPoint;
 use crate::report::picture::Picture;
 use crate::scene::{GroundTruth, Scene};
@@ -101,7 +101,7 @@ pub(crate) struct ShowResult {
     /// What load, exposure and readout take, s.
     pub(crate) chip_s: [f64; 3],
     /// Other schemes in the last frame.
-    pub(crate) schemes: Vec<Outcome>,
+    pub(crate) schemes: Vec<SchemeOutcome>,
 }
 
 /// Macropixels of a target on which schemes are compared, at most: a full histogram exposes each of them forty times.
@@ -153,7 +153,7 @@ impl Show {
         &self,
         demonstrator: &Demonstrator,
         frame: &DriveFrame,
-    ) -> Result<Vec<Outcome>, FrameError> {
+    ) -> Result<Vec<SchemeOutcome>, FrameError> {
         let world = self.settings.frame.scene.snapshot(frame.times.middle_s());
         let pixels: Vec<usize> = self.targets[0].pixels(&frame.truth).collect();
         let every = pixels.len().div_ceil(COMPARED).max(1);

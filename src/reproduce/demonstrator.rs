@@ -13,7 +13,7 @@ use super::claim::ClaimRow;
 use super::delay_line;
 use super::thesis::claim;
 use crate::demo::found::{TargetSummary, mean};
-use crate::demo::schemes::Outcome;
+use crate::demo::schemes::SchemeOutcome;
 use crate::demo::show::{Show, ShowResult};
 use crate::demo::sweep::{self, SweepPoint};
 use crate::demo::{Demonstrator, shows};
@@ -285,7 +285,7 @@ pub(super) fn glass_rows() -> Vec<ClaimRow> {
     let mut show = shows.swap_remove(0);
     show.frames = 1;
     let shown = run_show(show);
-    let outcome = |scheme: &str| -> &Outcome {
+    let outcome = |scheme: &str| -> &SchemeOutcome {
         let mut schemes = shown.schemes.iter();
         let outcome = schemes.find(|outcome| outcome.scheme == scheme);
         outcome.expect("all schemes are compared")

@@ -2,12 +2,12 @@
 
 use super::claim::ClaimRow;
 use super::parameters::{HSLIDAR_BIN_M, demonstrator};
-use super::thesis::{Scheme, Sensor, THESIS, chart, claim, grid};
+use super::thesis::{PublishedSensor, Scheme, THESIS, chart, claim, grid};
 use crate::report::{Chart, Grid};
 use crate::theory::partial::{System, sliding_reduction, zooming_reduction};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-impl Sensor {
+impl PublishedSensor {
     /// Bins of the full histogram that it stands for.
     fn equivalent_bins(&self) -> Option<f64> {
         let bins = f64::from(self.bins?);

@@ -26,7 +26,7 @@ pub(super) struct Thesis {
     pub figures: Vec<FigureText>,
     pub measurements: Vec<MeasurementText>,
     pub slips: Vec<Slip>,
-    pub sensors: Vec<Sensor>,
+    pub sensors: Vec<PublishedSensor>,
 }
 
 #[derive(Deserialize)]
@@ -106,7 +106,7 @@ pub(super) enum Scheme {
 /// A line of Tables 5 and 16.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Sensor {
+pub(super) struct PublishedSensor {
     pub author: String,
     pub year: u32,
     /// Rows and columns of ToF pixels.

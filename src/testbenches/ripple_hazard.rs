@@ -80,7 +80,7 @@ fn bins() -> Vec<usize> {
 }
 
 /// What one macropixel made of it.
-struct Captured {
+struct CapturedHits {
     /// Counts; none where a bit is unknown.
     counts: Vec<Option<u64>>,
     /// Laser cycles by how many HITs the photon left: none, one, two, and cycles with an unknown HIT.
@@ -89,7 +89,7 @@ struct Captured {
 
 /// Both macropixels, and what the timing checks say.
 struct Outcome {
-    pixels: Vec<Captured>,
+    pixels: Vec<CapturedHits>,
     /// Paths of the HIT flip-flops of both.
     hit_cells: [Vec<String>; 2],
     report: CheckReport,
@@ -191,7 +191,7 @@ fn expose(
             }] += 1;
         }
         let number = |nets: &Vec<NetId>| recorder.number_at(nets, schedule.end);
-        Captured {
+        CapturedHits {
             counts: probes.bins().iter().map(number).collect(),
             hits,
         }

@@ -250,13 +250,13 @@ proptest! {
 
 /// What a simulated macropixel did.
 #[derive(Debug)]
-struct Found {
+struct MacropixelOutcome {
     local_stops: Vec<Time>,
     events: Vec<HardwareEventKind>,
     violations: Vec<(CheckKind, Time)>,
 }
 
-impl Found {
+impl MacropixelOutcome {
     fn is_right(&self, exposure: &Exposure, strobe_cause: Time) -> bool {
         let stops = self.local_stops.iter().enumerate();
         let mut near = stops.map(|(cycle, &t)| t - exposure.stop(cycle as i64) - strobe_cause);
@@ -266,7 +266,12 @@ impl Found {
 }
 
 /// Exposes one macropixel; the delays of its reset's delay chain are multiplied by `chain`.
-fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Option<f64>) -> Found {
+fn captured(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    chain: Option<f64>,
+) -> MacropixelOutcome {
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[start], &[&[]]);
     if let Some(factor) = chain {
         let timing = shortened(gate.netlist(), factor);
@@ -281,7 +286,7 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
     let found = events.report.hardware_events.iter();
     let report = checks.report(gate.netlist());
     let violations = report.violations.iter();
-    Found {
+    MacropixelOutcome {
         local_stops: recorder
             .rising_edges(local_stop)
             .iter()

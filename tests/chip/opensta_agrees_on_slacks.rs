@@ -56,7 +56,7 @@ type Key = (&'static str, String, Launch, usize, usize);
 
 /// What a check asks and when its data come, ns.
 #[derive(Debug, Clone, Copy)]
-struct Found {
+struct CheckTimes {
     need: f64,
     arrival: f64,
     /// Half periods between launch and capture, and whether a flip-flop's data are its own.
@@ -67,9 +67,9 @@ struct Found {
 }
 
 /// The worst of each check.
-type Checks = BTreeMap<Key, Found>;
+type Checks = BTreeMap<Key, CheckTimes>;
 
-fn keep(checks: &mut Checks, key: Key, found: Found) {
+fn keep(checks: &mut Checks, key: Key, found: CheckTimes) {
     let is_late = matches!(key.0, "setup" | "recovery");
     let worst = checks.entry(key).or_insert(found);
     worst.arrival = if is_late {
@@ -78,7 +78,7 @@ fn keep(checks: &mut Checks, key: Key, found: Found) {
         worst.arrival.min(found.arrival)
     };
     if found.need > worst.need {
-        *worst = Found {
+        *worst = CheckTimes {
             arrival: worst.arrival,
             ..found
         };
@@ -156,7 +156,7 @@ fn theirs(report: &str, own_pins: &BTreeMap<String, String>) -> Checks {
         } else {
             0.0
         };
-        let found = Found {
+        let found = CheckTimes {
             need: halves as f64 * 0.5 * PERIOD_NS - slack + clamped,
             arrival: arrival - launch,
             halves,
@@ -189,7 +189,7 @@ fn theirs(report: &str, own_pins: &BTreeMap<String, String>) -> Checks {
         };
         let ((first, from), (last, to)) = (at_edge(*open), at_edge(*close));
         let launch = [Launch::ClkRise, Launch::ClkFall][from];
-        let found = Found {
+        let found = CheckTimes {
             need: (last - first) as f64 * 0.5 * PERIOD_NS - slack,
             arrival: f64::NAN,
             halves: last - first,
@@ -243,7 +243,7 @@ fn ours(mapped: &MappedChip) -> Checks {
         let name = kind.name();
         let launch = launches[requirement.launch as usize];
         let cell = netlist.cell_path(requirement.cell);
-        let found = Found {
+        let found = CheckTimes {
             need: ns(requirement.need) + limit,
             arrival: window.map_or(f64::NAN, ns),
             halves: requirement.halves,
@@ -299,7 +299,7 @@ fn ours(mapped: &MappedChip) -> Checks {
                         ("removal", ns(late - first) + limit(CheckKind::Removal)),
                     ];
                     for (name, need) in needs {
-                        let found = Found {
+                        let found = CheckTimes {
                             need,
                             arrival: f64::NAN,
                             halves: 0,

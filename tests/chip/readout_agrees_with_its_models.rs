@@ -247,12 +247,12 @@ fn what_the_pins_tell_of_an_exposed_sensor_is_what_its_counters_hold() {
 
 #[test]
 fn the_readout_causes_no_event_while_nothing_is_read() {
-    struct Moved {
+    struct NetChanges {
         nets: Vec<bool>,
         from: Time,
         found: usize,
     }
-    impl Observer for Moved {
+    impl Observer for NetChanges {
         fn change(&mut self, time: Time, net: NetId, _: Logic) {
             self.found += usize::from(time > self.from && self.nets[net.index()]);
         }
@@ -276,7 +276,7 @@ fn the_readout_causes_no_event_while_nothing_is_read() {
     }
     assert!(nets.iter().filter(|&&watched| watched).count() > 100);
     let from = gate.schedule().reset_end + SETTLING;
-    let mut moved = Moved {
+    let mut moved = NetChanges {
         nets,
         from,
         found: 0,

@@ -77,13 +77,13 @@ fn through_sdf(drawn: &Timing, timing: &Timing, netlist: &Netlist, corner: Corne
 }
 
 /// One of the cases that Icarus simulates at once: its Verilog, whose modules end in `_{index}`, and our waves until `end`.
-struct Prepared {
+struct IcarusCase {
     verilog: String,
     ours: Waves,
     end: Time,
 }
 
-fn prepared(case: &Case, index: usize) -> Prepared {
+fn prepared(case: &Case, index: usize) -> IcarusCase {
     let top = case.circuit();
     let netlist = Netlist::elaborate(&top);
     let drives = case.drives(&netlist);
@@ -112,7 +112,7 @@ fn prepared(case: &Case, index: usize) -> Prepared {
     let bench = testbench(&top, &netlist, &drives, &parameters);
     let verilog = String::from_utf8(verilog).unwrap() + &bench;
     let selection = WaveSelection::all().with_anonymous();
-    Prepared {
+    IcarusCase {
         verilog: with_modules_numbered(&verilog, index),
         ours: simulate(&ours, &netlist, drives, end, &selection),
         end,

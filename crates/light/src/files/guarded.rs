@@ -25,22 +25,22 @@ type FileId = (u64, u64);
 type FileId = PathBuf;
 
 #[derive(Debug)]
-struct Guarded {
+struct InputGuard {
     /// With the name by which each was opened.
     inputs: BTreeMap<FileId, PathBuf>,
     sentences: Vec<String>,
 }
 
 /// Nothing for a library: a long-lived process may write what it once read.
-static GUARDED: Mutex<Option<Guarded>> = Mutex::new(None);
+static GUARDED: Mutex<Option<InputGuard>> = Mutex::new(None);
 
-fn guarded() -> MutexGuard<'static, Option<Guarded>> {
+fn guarded() -> MutexGuard<'static, Option<InputGuard>> {
     GUARDED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// From now on, files that this process reads are not replaced. For `main` alone.
 pub fn guard_inputs() {
-    guarded().get_or_insert(Guarded {
+    guarded().get_or_insert(InputGuard {
         inputs: BTreeMap::new(),
         sentences: Vec::new(),
     });

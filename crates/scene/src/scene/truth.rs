@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 use super::bounds::Bounds;
 use super::cast::Stage;
 use super::settings::Scene;
-use super::unmoved::Moved;
+use super::unmoved::MovedObjects;
 use super::view::{Surface, View, cone};
 use crate::photon::DEEP;
 use crate::units::TimeOfFlight;
@@ -62,7 +62,10 @@ impl GroundTruth {
     ) -> (Self, usize) {
         let moved = before.and_then(|before| {
             debug_assert_eq!((before.truth.rows, before.truth.cols), (rows, cols));
-            Some((Moved::from_worlds(before.world, scene)?, before.truth))
+            Some((
+                MovedObjects::from_worlds(before.world, scene)?,
+                before.truth,
+            ))
         });
         let camera = scene.lidar_camera(rows, cols);
         let (stage, bounds) = (Stage::new(scene), Bounds::from_scene(scene, DVec3::ZERO));

@@ -16,7 +16,7 @@ use super::settings::Scene;
 
 /// Objects that are not the same in two worlds.
 #[derive(Debug)]
-pub(super) struct Moved {
+pub(super) struct MovedObjects {
     /// Of each object, whether it is.
     is_moved: Vec<bool>,
     has_mirror: Vec<bool>,
@@ -24,7 +24,7 @@ pub(super) struct Moved {
     bounds: [Bounds; 2],
 }
 
-impl Moved {
+impl MovedObjects {
     /// Those from one world to another; `None` where all has to be looked at again.
     pub(super) fn from_worlds(before: &Scene, now: &Scene) -> Option<Self> {
         let has_one_look = before.lidar == now.lidar
@@ -40,7 +40,7 @@ impl Moved {
         let pairs = before.objects.iter().zip(&now.objects);
         let is_moved: Vec<bool> = pairs.map(|(before, now)| before != now).collect();
         let is_any = is_moved.contains(&true);
-        (!is_any || now.towards_sun().is_none()).then(|| Moved {
+        (!is_any || now.towards_sun().is_none()).then(|| MovedObjects {
             is_moved,
             has_mirror: now.objects.iter().map(|o| o.mirror > 0.0).collect(),
             bounds: [before, now].map(|world| Bounds::from_scene(world, DVec3::ZERO)),
@@ -149,7 +149,8 @@ mod tests {
         let mut later = places;
         later[1].0 += 0.3;
         let [before, now] = [places, later].map(|places| room(&places, 0.0, None));
-        let moved = Moved::from_worlds(&before, &now).expect("nothing but a ball is another");
+        let moved =
+            MovedObjects::from_worlds(&before, &now).expect("nothing but a ball is another");
         let camera = now.lidar_camera(16, 16);
         let cones = (0..16).flat_map(|row| (0..16).map(move |col| (row, col)));
         let kept =
@@ -157,8 +158,8 @@ mod tests {
         let kept = kept.count();
         assert!((150..256).contains(&kept), "{kept}");
         let [lit, sunny] = [None, Some(30.0)].map(|sun| room(&places, 0.0, sun));
-        assert!(Moved::from_worlds(&lit, &sunny).is_none());
-        assert!(Moved::from_worlds(&sunny, &room(&later, 0.0, Some(30.0))).is_none());
-        assert!(Moved::from_worlds(&sunny, &sunny).is_some());
+        assert!(MovedObjects::from_worlds(&lit, &sunny).is_none());
+        assert!(MovedObjects::from_worlds(&sunny, &room(&later, 0.0, Some(30.0))).is_none());
+        assert!(MovedObjects::from_worlds(&sunny, &sunny).is_some());
     }
 }

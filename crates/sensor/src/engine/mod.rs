@@ -31,7 +31,7 @@ mod window;
 
 pub use cancelling::{Cancelling, cancelled};
 pub use cohort::{Cohort, CohortOptions, variance_left_out};
-pub use cycle::{Cycle, PackedPulses, Unlevelled};
+pub use cycle::{Cycle, LevelisationError, PackedPulses};
 pub use error::{EngineError, NotModelled};
 pub use exposing::{
     Answer, expose, expose_without_skipping, full_stream, refuse_floods, stream_config,

@@ -40,13 +40,13 @@ const MOST_KEPT: usize = 64;
 
 thread_local! {
     /// The latest steps that differ, the last first.
-    static LATEST: RefCell<Vec<Rc<Steps>>> = const { RefCell::new(Vec::new()) };
+    static LATEST: RefCell<Vec<Rc<PlainSteps>>> = const { RefCell::new(Vec::new()) };
     static ROWS: RefCell<Rows> = RefCell::default();
 }
 
 /// Steps in which time goes, of one length within a bin, and what follows from them alone.
 #[derive(Debug)]
-pub(super) struct Steps {
+pub(super) struct PlainSteps {
     /// The first bin, which may lie before those of the histogram.
     first_bin: f64,
     /// Steps of each bin from there.
@@ -61,7 +61,7 @@ pub(super) struct Steps {
     parts: Vec<(usize, [f64; 4])>,
 }
 
-impl Steps {
+impl PlainSteps {
     /// Those of `bins` bins: `steps` in each with light of a pulse, and in each where SPADs recover from it a dead time of `dead` bins later.
     pub(super) fn for_pulses(
         first_bin: f64,
@@ -109,7 +109,7 @@ impl Steps {
             begin += 1.0;
         }
         times.push(begin);
-        Steps {
+        PlainSteps {
             first_bin,
             of_bins,
             dead,
@@ -244,7 +244,7 @@ pub(super) type OfBins<const K: usize> = SmallVec<[Dual<K>; 16]>;
 pub(super) fn fired<const K: usize>(
     pulse: &Pulse,
     background: f64,
-    steps: &Steps,
+    steps: &PlainSteps,
     of_bins: &mut OfBins<K>,
 ) {
     const { assert!(K == 0 || K == 4, "slopes come all together") };
@@ -255,7 +255,7 @@ pub(super) fn fired<const K: usize>(
 fn fired_in<const K: usize>(
     pulse: &Pulse,
     background: f64,
-    steps: &Steps,
+    steps: &PlainSteps,
     rows: &mut Rows,
     of_bins: &mut OfBins<K>,
 ) {
@@ -349,7 +349,7 @@ type Lanes = [f64; LANES];
 pub(super) fn fired_by_each<const K: usize>(
     pulses: &[Pulse; LANES],
     background: &Lanes,
-    steps: &Steps,
+    steps: &PlainSteps,
     of_bins: &mut [OfBins<K>; LANES],
 ) {
     ROWS.with_borrow_mut(|rows| {
@@ -361,7 +361,7 @@ pub(super) fn fired_by_each<const K: usize>(
 fn fired_by_each_in<const K: usize>(
     pulses: &[Pulse; LANES],
     background: &Lanes,
-    steps: &Steps,
+    steps: &PlainSteps,
     rows: &mut LaneRows,
     of_bins: &mut [OfBins<K>; LANES],
 ) {

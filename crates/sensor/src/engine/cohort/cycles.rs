@@ -8,7 +8,7 @@
 //! Early ones may remember the first STOP edge, or lack an echo that a cycle before the exposure would have sent; late
 //! ones lack that of a cycle after it. All others are alike, unless a SPAD stays busy from one window to the next:
 //! without a dead time's length free of photons it cannot be told whether it has recovered. The probability of that
-//! is bounded by going back from a window, dead time by dead time ([`Scene::busy_back_to`]).
+//! is bounded by going back from a window, dead time by dead time ([`CohortLight::busy_back_to`]).
 
 use smallvec::SmallVec;
 
@@ -51,7 +51,7 @@ impl LikeCycles {
 }
 
 /// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.
-pub(super) struct Scene {
+pub(super) struct CohortLight {
     pub light: SpadLight,
     pub dead_fs: f64,
     /// How long after a dead time its avalanche may have caused another one.
@@ -100,7 +100,7 @@ pub(super) struct Class {
     pub not_compared: usize,
 }
 
-impl Scene {
+impl CohortLight {
     /// Lengths of a dead time, of what an avalanche may cause after it, and of a CLK period, the start of the window and the length of a laser cycle, fs.
     pub(super) fn new(
         light: SpadLight,
@@ -109,7 +109,7 @@ impl Scene {
         bins: usize,
         edges_fs: Option<Vec<f64>>,
     ) -> Self {
-        Scene {
+        CohortLight {
             edges_fs,
             busy: absorbed(light.most_background(dead_fs)),
             light,

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::cycles::Scene;
+use super::cycles::CohortLight;
 use crate::chip::{SensorConfig, Tdc, correlation};
 use crate::engine::{EngineError, NotModelled};
 use crate::units::Time;
@@ -94,7 +94,7 @@ const MEETINGS_THAT_DO_NOT_COUNT: f64 = 0.01;
 /// Where that may put the mean of a bin off by more than `error` of its counting noise: λ²·stage² of the laser
 /// cycles at either edge, with λ photons a second on all SPADs together and `stage`, the delay of an XOR, at most.
 pub(super) fn check_meetings(
-    scene: &Scene,
+    scene: &CohortLight,
     spads: usize,
     stage: Time,
     laser_cycles: u32,

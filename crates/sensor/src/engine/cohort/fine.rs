@@ -29,7 +29,7 @@ use smallvec::{SmallVec, smallvec};
 
 use super::FEW_STEPS;
 use super::blindness::{Ages, Blindness};
-use super::cycles::{Class, NeighbourStart, Scene};
+use super::cycles::{Class, CohortLight, NeighbourStart};
 use super::events::EventTable;
 use super::grid::{CELLS, Grid};
 use super::hits::Hits;
@@ -134,7 +134,7 @@ impl Fine {
 /// # Errors
 /// When the finest grid does not do.
 pub(super) fn solve(
-    scene: &Scene,
+    scene: &CohortLight,
     blindness: &Blindness,
     secondaries: Secondaries,
     class: &Class,
@@ -197,7 +197,7 @@ pub(super) fn event(is_event: &EventTable, pulse: f64) -> [f64; 2] {
 
 /// One SPAD, carried through the window.
 fn carry(
-    scene: &Scene,
+    scene: &CohortLight,
     blindness: &Blindness,
     secondaries: Secondaries,
     class: &Class,

@@ -29,7 +29,7 @@ use super::abreast::{LANES, Lanes, binomials};
 use super::cycles::LikeCycles;
 use super::draw::binomial;
 use super::events::{EventTable, NoEvent};
-use super::weighted::Weighted;
+use super::weighted::WeightedSpad;
 use super::words::RandomWords;
 
 /// Bins that a history may tell of; of the fewest, all histories go abreast.
@@ -65,13 +65,13 @@ pub(crate) fn histories(
     let spads = (no_event.weight, is_event.spads());
     let rows = means.len().div_ceil(LANES);
     let pairs = Pairs::new(
-        Weighted::new(blindness, ages, spads, rows),
+        WeightedSpad::new(blindness, ages, spads, rows),
         &no_event,
         means,
     );
     for known in KNOWN {
         let rows = (1 << known) / LANES;
-        let spads = Weighted::new(blindness, ages, spads, rows);
+        let spads = WeightedSpad::new(blindness, ages, spads, rows);
         let (histories, without) = Histories::new(spads, &no_event, known, means);
         if pairs.left_out_by(&histories, &without, neglect) <= neglect {
             return Some(histories);
@@ -111,7 +111,7 @@ impl Histories {
     /// without an event; both by bin and history.
     #[inline(always)]
     fn new(
-        mut spads: Weighted,
+        mut spads: WeightedSpad,
         no_event: &NoEvent,
         known: u32,
         means: &[f64],
@@ -241,7 +241,7 @@ struct Pairs {
 impl Pairs {
     /// With `means` photons on a SPAD; `spads` are under a weighting for every bin.
     #[inline(always)]
-    fn new(mut spads: Weighted, no_event: &NoEvent, means: &[f64]) -> Self {
+    fn new(mut spads: WeightedSpad, no_event: &NoEvent, means: &[f64]) -> Self {
         let bins = means.len();
         let rows = bins.div_ceil(LANES);
         let mut single = Vec::with_capacity(bins);
@@ -361,7 +361,7 @@ mod tests {
                 let like = LikeCycles::steady(1, blindness, 0.1, &light());
                 let no_event = is_event.no_event().unwrap();
                 let spads = (no_event.weight, is_event.spads());
-                let spads = Weighted::new(&like.blindness, &like.ages, spads, 1);
+                let spads = WeightedSpad::new(&like.blindness, &like.ages, spads, 1);
                 let (histories, _) = Histories::new(spads, &no_event, 4, &like.means);
                 let mut random = RandomWords::new(6, 0);
                 let mut seen = [vec![[0u32; 32]; BINS - 4], vec![[0u32; 32]; BINS - 4]];
@@ -429,7 +429,7 @@ mod tests {
             let no_event = is_event.no_event().unwrap();
             let weighted = |rows| {
                 let spads = (no_event.weight, is_event.spads());
-                Weighted::new(&blindness, &ages, spads, rows)
+                WeightedSpad::new(&blindness, &ages, spads, rows)
             };
             let pairs = Pairs::new(weighted(1), &no_event, &means);
             let [few, some, all] = KNOWN.map(|known| {

@@ -41,19 +41,19 @@ use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::window_law::WindowLaw;
 use crate::chip::{Exposure, Sensor};
 use crate::photon::{PhotonStream, SpadEvent};
-use levelise::Levelised;
+use levelise::LevelisedLogic;
 use packing::{PERIODS, Packed};
 use schedule::Schedule;
 use stream::Flow;
 use survey::Survey;
 use tape::Block;
-pub use unlevelled::Unlevelled;
+pub use unlevelled::LevelisationError;
 use word::{WORD_LANES, Word, inversion};
 
 /// A netlist that can be run.
 struct Machine {
     survey: Survey,
-    levelised: Levelised,
+    levelised: LevelisedLogic,
 }
 
 /// Runs the levelised netlist.
@@ -62,7 +62,7 @@ pub struct Cycle {
     exposure: Exposure,
     law: WindowLaw,
     replays_control: bool,
-    machine: OnceLock<Result<Machine, Unlevelled>>,
+    machine: OnceLock<Result<Machine, LevelisationError>>,
 }
 
 /// Pulses, sorted for [`Cycle::replay_packed`].
@@ -94,11 +94,11 @@ impl Cycle {
         }
     }
 
-    fn machine(&self) -> Result<&Machine, &Unlevelled> {
+    fn machine(&self) -> Result<&Machine, &LevelisationError> {
         let machine = self.machine.get_or_init(|| {
             if self.sensor.front_end.joins() {
                 let wire = "the wire that all SPADs share".to_owned();
-                return Err(Unlevelled::Structure(wire));
+                return Err(LevelisationError::Structure(wire));
             }
             if self.sensor.front_end_block.is_some() {
                 let circuit = MacropixelCircuit::new(&self.sensor, (0, 0));
@@ -111,18 +111,18 @@ impl Cycle {
                 {
                     let what =
                         "a front end in which CLK sees SPADs after different times".to_owned();
-                    return Err(Unlevelled::Structure(what));
+                    return Err(LevelisationError::Structure(what));
                 }
             }
             let survey = Survey::new(&self.sensor, &self.exposure);
-            let levelised = Levelised::new(&survey, &self.sensor, &self.exposure)?;
+            let levelised = LevelisedLogic::new(&survey, &self.sensor, &self.exposure)?;
             Ok(Machine { survey, levelised })
         });
         machine.as_ref()
     }
 
     /// Why this sensor's macropixels cannot be levelised and are left to the gate engine, if so.
-    pub fn unlevelled(&self) -> Option<&Unlevelled> {
+    pub fn unlevelled(&self) -> Option<&LevelisationError> {
         self.machine().err()
     }
 
@@ -158,9 +158,9 @@ impl Cycle {
         &self,
         starts: &[u16],
         packed: &PackedPulses,
-    ) -> Result<Histograms, Unlevelled> {
-        let machine = self.machine().map_err(Unlevelled::clone)?;
-        let blocks: Result<Vec<_>, Unlevelled> = packed
+    ) -> Result<Histograms, LevelisationError> {
+        let machine = self.machine().map_err(LevelisationError::clone)?;
+        let blocks: Result<Vec<_>, LevelisationError> = packed
             .blocks
             .par_iter()
             .map(|(pixels, pulses)| {
@@ -188,8 +188,8 @@ impl Machine {
         replays_control: bool,
         starts: &[u16],
         pulses: &Packed,
-    ) -> Result<Histograms, Unlevelled> {
-        let Levelised {
+    ) -> Result<Histograms, LevelisationError> {
+        let LevelisedLogic {
             stream,
             passes: tape,
             parts,
@@ -206,16 +206,18 @@ impl Machine {
             replays_control,
         );
         if let Some(place) = block.trapped {
-            return Err(Unlevelled::Trapped(self.name(place)));
+            return Err(LevelisationError::Trapped(self.name(place)));
         }
         if !block.is_settled() {
-            return Err(Unlevelled::Trapped("a net that does not settle".to_owned()));
+            return Err(LevelisationError::Trapped(
+                "a net that does not settle".to_owned(),
+            ));
         }
         Ok(self.counts(&block, starts.len()))
     }
 
     /// Every place of a block when the exposure starts. Lanes that are left over repeat the last start value.
-    fn start(&self, starts: &[u16]) -> Result<Vec<Word>, Unlevelled> {
+    fn start(&self, starts: &[u16]) -> Result<Vec<Word>, LevelisationError> {
         let mut words = vec![Word::ZERO; self.levelised.places];
         let last = *starts.last().expect("a block has a macropixel");
         for &(place, net, inverted) in &self.levelised.initial {

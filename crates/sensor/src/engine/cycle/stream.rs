@@ -20,7 +20,7 @@ use multiversion::multiversion;
 
 use super::expression::{Expressions, Literal, Node};
 use super::packing::{PERIODS, Packed, Pulse};
-use super::unlevelled::Unlevelled;
+use super::unlevelled::LevelisationError;
 use super::word::{Word, inversion};
 use crate::netlist::NetId;
 
@@ -83,7 +83,7 @@ impl StreamTape {
         expressions: &mut Expressions<'_>,
         spads: usize,
         nets: &[NetId],
-    ) -> Result<(Self, Vec<Tap>), Unlevelled> {
+    ) -> Result<(Self, Vec<Tap>), LevelisationError> {
         let roots: Result<Vec<Literal>, _> = nets.iter().map(|&n| expressions.of_net(n)).collect();
         let roots = roots?;
         let mut layout = Layout::new(expressions, &roots);

@@ -16,7 +16,7 @@
 
 use std::collections::HashMap;
 
-use super::unlevelled::Unlevelled;
+use super::unlevelled::LevelisationError;
 use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, array};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};
@@ -103,7 +103,7 @@ impl Survey {
     ///
     /// # Errors
     /// When it is unknown.
-    pub(super) fn initial(&self, net: NetId, start: u16) -> Result<bool, Unlevelled> {
+    pub(super) fn initial(&self, net: NetId, start: u16) -> Result<bool, LevelisationError> {
         let (one, zero) = self.initial[usize::from(start) / LANES][net.index()];
         match (
             one >> (usize::from(start) % LANES) & 1,
@@ -111,7 +111,7 @@ impl Survey {
         ) {
             (1, _) => Ok(true),
             (_, 1) => Ok(false),
-            _ => Err(Unlevelled::Unknown(self.name(net))),
+            _ => Err(LevelisationError::Unknown(self.name(net))),
         }
     }
 

@@ -87,7 +87,7 @@ impl Leveliser<'_> {
     ///
     /// # Errors
     /// When the cause is a reset, or set, that is too short for its own effects.
-    pub(super) fn reach(&self, cause: Cause) -> Result<Reach, Unlevelled> {
+    pub(super) fn reach(&self, cause: Cause) -> Result<Reach, LevelisationError> {
         let cells = self.survey.netlist.cells();
         let mut held = self.flip_flops();
         held.retain(|&cell| self.hold_fs(cause, cell) > 0);
@@ -106,7 +106,9 @@ impl Leveliser<'_> {
             let mut released = reach.held.difference(&held);
             let is_own = |cell: &&usize| Self::controls_of(&cells[**cell]).any(|n| n == cause.net);
             if let Some(&cell) = released.find(|cell| cause.value && is_own(cell)) {
-                return Err(Unlevelled::Clear(self.survey.netlist.cell_path(cell)));
+                return Err(LevelisationError::Clear(
+                    self.survey.netlist.cell_path(cell),
+                ));
             }
             if held.len() == reach.held.len() {
                 return Ok(reach);
@@ -119,7 +121,7 @@ impl Leveliser<'_> {
     ///
     /// # Errors
     /// When paths of different length lead there.
-    pub(super) fn find_releases(&mut self, reaches: &[Reach]) -> Result<(), Unlevelled> {
+    pub(super) fn find_releases(&mut self, reaches: &[Reach]) -> Result<(), LevelisationError> {
         let nets = self.controls();
         for reach in reaches {
             for &(net, edge) in &reach.order {
@@ -165,8 +167,8 @@ impl Leveliser<'_> {
         &self,
         net: NetId,
         (shortest_fs, longest_fs): (i64, i64),
-    ) -> Unlevelled {
-        Unlevelled::Ambiguous {
+    ) -> LevelisationError {
+        LevelisationError::Ambiguous {
             net: self.survey.name(net),
             shortest_fs,
             longest_fs,
