@@ -9,7 +9,7 @@ use guided_dtof::kernel::Observer;
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, ModuleBuilder, NetId, Netlist};
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Format, FstWriter, Selection, VcdWriter, WaveWriter};
+use guided_dtof::waves::{Format, FstWriter, VcdWriter, WaveSelection, WaveWriter};
 
 const CHANGES: u64 = 10_000_000;
 const NETS: usize = 1 << 12;
@@ -62,7 +62,7 @@ fn waves(criterion: &mut Criterion) {
         ("14-bit buses, each bit at its own time", &buses, 1),
         ("14-bit buses, all bits at once", &buses, BUS_WIDTH as u64),
     ];
-    let all = Selection::all();
+    let all = WaveSelection::all();
     for (name, netlist, per_instant) in cases {
         group.bench_function(format!("vcd: {name}"), |b| {
             let writer = || VcdWriter::new(io::sink(), netlist, &all).expect("a sink");

@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use guided_dtof::guide::{GuideError, GuideInput, GuideMap, PastFrame, options};
-use guided_dtof::photon::{Purpose, normal, random_stream};
+use guided_dtof::photon::{RandomPurpose, normal, random_stream};
 use guided_dtof::scene::{GroundTruth, Scene};
 
 /// Guides of the table, fused where there are several.
@@ -37,13 +37,13 @@ const DEPTH_SIGMA_M: f64 = 0.1;
 
 /// How a guide's claims have been kept.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Kept {
+struct GuideErrors {
     targets: usize,
     /// Error over the standard deviation claimed, of all that have an estimate, and the error, m.
     errors: Vec<(f64, f64)>,
 }
 
-impl Kept {
+impl GuideErrors {
     /// Share of the estimates whose target is within `sigmas` standard deviations as claimed.
     fn share_within(&self, sigmas: f64) -> f64 {
         let inside = self.errors.iter().filter(|(size, _)| *size <= sigmas);
@@ -88,13 +88,13 @@ impl Kept {
 ///
 /// # Panics
 /// When there is no such guide.
-fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<Kept, GuideError> {
+fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<GuideErrors, GuideError> {
     let looks_back = guide.contains("kalman");
     let guide = options::parse_all(guide.split('+'), "guide").expect("a guide");
-    let mut all = Kept::default();
+    let mut all = GuideErrors::default();
     for frame in 0..frames {
         let (now_s, seed) = (f64::from(frame), u64::from(frame));
-        let now = scene.at(now_s);
+        let now = scene.snapshot(now_s);
         let truth = GroundTruth::render(&now, SIZE, SIZE);
         let past = |number: usize| past(scene, now_s - FRAME_S * number as f64, seed, number);
         let earlier: Vec<PastFrame> = if looks_back {
@@ -113,9 +113,9 @@ fn kept(guide: &str, scene: &Scene, frames: u32) -> Result<Kept, GuideError> {
 }
 
 fn past(scene: &Scene, time_s: f64, seed: u64, number: usize) -> PastFrame {
-    let truth = GroundTruth::render(&scene.at(time_s), SIZE, SIZE);
+    let truth = GroundTruth::render(&scene.snapshot(time_s), SIZE, SIZE);
     let ranges = (0u32..).zip(&truth.range_m).map(|(pixel, range_m)| {
-        let mut random = random_stream(seed, Purpose::Guide, pixel, DRAWS + number as u32);
+        let mut random = random_stream(seed, RandomPurpose::Guide, pixel, DRAWS + number as u32);
         range_m.map(|range_m| range_m + DEPTH_SIGMA_M * normal(&mut random))
     });
     PastFrame {

@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --example edges_of_a_window`
 
-use guided_dtof::chip::{Exposure, SensorConfig, Window, WindowLaw};
+use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw, WindowOutcome};
 
 fn main() {
     let config = SensorConfig::default();
@@ -11,16 +11,16 @@ fn main() {
     println!("start   opens after STOP       closes             strobe's slack");
     for start in [0, 1, 16, 100, 511] {
         match law.window(start) {
-            Window::Open(window) => {
+            WindowOutcome::Open(window) => {
                 let seen = law.interval(&window);
                 println!(
                     "{start:5}   {:<20} {:<20} {}",
                     seen.start, seen.end, window.slack
                 );
             }
-            Window::Never => println!("{start:5}   LOCAL_STOP does not come"),
-            Window::Irregular(why) => println!("{start:5}   {why}"),
-            Window::Race(race) => println!("{start:5}   {race}"),
+            WindowOutcome::Never => println!("{start:5}   LOCAL_STOP does not come"),
+            WindowOutcome::Irregular(why) => println!("{start:5}   {why}"),
+            WindowOutcome::Race(race) => println!("{start:5}   {race}"),
         }
     }
     let window = law.window(100).open().expect("it is open");

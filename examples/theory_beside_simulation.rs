@@ -6,7 +6,7 @@
 use guided_dtof::chip::{Exposure, SensorConfig};
 use guided_dtof::engine::{Engine, EngineError, Expose, LitPixel, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
-use guided_dtof::theory::detection::{Model, PerCycle, Ties, probability};
+use guided_dtof::theory::detection::{DetectionModel, PerCycle, Ties, probability};
 use guided_dtof::units::Time;
 
 const MACROPIXELS: u32 = 4096;
@@ -52,7 +52,11 @@ fn main() -> Result<(), EngineError> {
             others.into_iter().all(|(_, &count)| count < target)
         });
         let simulated = found.count() as f64 / f64::from(MACROPIXELS);
-        let theory = probability(&light, laser_cycles.into(), Model::Bernoulli(Ties::Strict));
+        let theory = probability(
+            &light,
+            laser_cycles.into(),
+            DetectionModel::Bernoulli(Ties::Strict),
+        );
         println!(
             "{laser_cycles:12}   {:.4}   {simulated:.4}",
             theory.probability

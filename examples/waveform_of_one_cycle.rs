@@ -32,7 +32,7 @@ fn main() -> Result<(), InputError> {
     record(
         &mut simulation,
         &file,
-        WaveFormat::of(&file),
+        WaveFormat::from_path(&file),
         &view,
         &mut (),
     )?;

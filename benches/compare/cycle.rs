@@ -19,7 +19,7 @@ use guided_dtof::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 /// Rising CLK edge and SPAD.
-type Taken = Vec<(u32, u16)>;
+type StimulusPulses = Vec<(u32, u16)>;
 
 fn main() -> std::io::Result<()> {
     let arguments: Vec<String> = std::env::args().filter(|a| a != "--bench").collect();
@@ -37,7 +37,7 @@ fn main() -> std::io::Result<()> {
     let starts: Vec<u16> = (0..config.pixels())
         .map(|_| random.random_range(0..largest))
         .collect();
-    let taken: Vec<Taken> = starts
+    let taken: Vec<StimulusPulses> = starts
         .iter()
         .map(|&start| match stimulus.as_str() {
             "bright" => bright(random, &config, periods * cycles),
@@ -72,7 +72,9 @@ fn main() -> std::io::Result<()> {
             let packed = engine.pack(&starts, &pulses);
             let packing = clock.elapsed().as_secs_f64();
             let clock = ProcessTime::now();
-            histograms = engine.run(&starts, &packed).expect("it is levelised");
+            histograms = engine
+                .replay_packed(&starts, &packed)
+                .expect("it is levelised");
             println!("{:.9} {packing:.9}", clock.elapsed().as_secs_f64());
         }
         let counts = histograms.counts().iter().flat_map(|n| n.to_le_bytes());
@@ -89,11 +91,11 @@ fn street(
     periods: u32,
     cycles: u32,
     start: u16,
-) -> Taken {
+) -> StimulusPulses {
     let edges = periods * cycles;
     let background = (10e6 / config.clk_hz * f64::from(edges)) as usize;
     let signal = (0..cycles).map(|c| (c * periods + u32::from(start) + edges - 8) % edges);
-    let mut taken: Taken = (0..background)
+    let mut taken: StimulusPulses = (0..background)
         .map(|_| random.random_range(0..edges))
         .collect::<Vec<_>>()
         .into_iter()
@@ -105,10 +107,10 @@ fn street(
     taken
 }
 
-fn bright(random: &mut StdRng, config: &SensorConfig, edges: u32) -> Taken {
+fn bright(random: &mut StdRng, config: &SensorConfig, edges: u32) -> StimulusPulses {
     // Dead for 8 ns, then 100 Mcounts/s: 18 ns from pulse to pulse.
     let (dead, chance) = ((8e-9 * config.clk_hz).ceil() as u32, 100e6 / config.clk_hz);
-    let mut taken = Taken::new();
+    let mut taken = StimulusPulses::new();
     for spad in 0..16u16 {
         let mut edge = 0;
         while edge < edges {
@@ -124,7 +126,11 @@ fn bright(random: &mut StdRng, config: &SensorConfig, edges: u32) -> Taken {
     taken
 }
 
-fn write_stimulus(directory: &Path, starts: &[u16], taken: &[Taken]) -> std::io::Result<()> {
+fn write_stimulus(
+    directory: &Path,
+    starts: &[u16],
+    taken: &[StimulusPulses],
+) -> std::io::Result<()> {
     let file = |name: &str| File::create(directory.join(name)).map(BufWriter::new);
     let mut out = file("starts.bin")?;
     for start in starts {

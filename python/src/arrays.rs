@@ -1,6 +1,6 @@
 //! Arrays that come and go. What goes owns the vector that the library made: nothing is copied.
 
-use guided_dtof::system::{RETURNS, Return, Returns};
+use guided_dtof::system::{DepthReturn, DepthReturns, RETURNS};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -29,7 +29,7 @@ pub(crate) fn cube<T: Element>(
 }
 
 /// Sets the arrays of an array's returns: rows × columns × as many as are told, not a number where there are fewer.
-pub(crate) fn set_returns<'r, I: Iterator<Item = &'r Returns>>(
+pub(crate) fn set_returns<'r, I: Iterator<Item = &'r DepthReturns>>(
     dict: &Bound<'_, PyDict>,
     (rows, cols): (usize, usize),
     of_pixels: impl Fn() -> I,
@@ -37,7 +37,7 @@ pub(crate) fn set_returns<'r, I: Iterator<Item = &'r Returns>>(
     for (name, number) in [
         (
             "returns",
-            (|r| Some(r.depth_m)) as fn(&Return) -> Option<f64>,
+            (|r| Some(r.depth_m)) as fn(&DepthReturn) -> Option<f64>,
         ),
         ("returns_bound", |r| r.bound_m),
         ("returns_photons", |r| Some(r.photons)),

@@ -49,9 +49,9 @@ pub(crate) fn range_counts<'py>(
         let profile = calibration
             .map(|path| read_calibration(&path, &sensor))
             .transpose()?;
-        let of = (&sensor, &exposure);
+        let chip = (&sensor, &exposure);
         Ok(system::range_counts(
-            of,
+            chip,
             &world,
             &options,
             profile.as_ref(),
@@ -60,11 +60,14 @@ pub(crate) fn range_counts<'py>(
         )?)
     })?;
     let dict = PyDict::new(py);
-    let metres = |of: fn(&system::Reading) -> Option<f64>| {
+    let metres = |distance: fn(&system::Reading) -> Option<f64>| {
         map(
             py,
             shape,
-            readings.iter().map(|r| of(r).unwrap_or(f64::NAN)).collect(),
+            readings
+                .iter()
+                .map(|r| distance(r).unwrap_or(f64::NAN))
+                .collect(),
         )
     };
     dict.set_item("depth", metres(|r| r.measured_m))?;

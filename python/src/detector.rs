@@ -16,9 +16,9 @@ use crate::background::run;
 use crate::failure::Failure;
 
 /// Bins, and the detector's description as JSON.
-type Described = (usize, String);
+type BinsAndDescription = (usize, String);
 
-fn detector((bins, description): Described) -> Result<Detector, Failure> {
+fn detector((bins, description): BinsAndDescription) -> Result<Detector, Failure> {
     let description: DetectorDescription = serde_json::from_str(&description)
         .map_err(|error| Failure::argument("detector", error.to_string()))?;
     let detector = description.detector(bins);
@@ -33,7 +33,7 @@ fn detector((bins, description): Described) -> Result<Detector, Failure> {
 
 /// Checks a description.
 #[pyfunction]
-pub(crate) fn detector_checked(described: Described) -> PyResult<()> {
+pub(crate) fn detector_checked(described: BinsAndDescription) -> PyResult<()> {
     detector(described)?;
     Ok(())
 }
@@ -51,7 +51,7 @@ pub(crate) fn detector_file(path: std::path::PathBuf) -> PyResult<String> {
 #[pyfunction]
 pub(crate) fn detector_crosstalk<'py>(
     py: Python<'py>,
-    described: Described,
+    described: BinsAndDescription,
     sums: PyReadonlyArray2<'py, u32>,
     histograms: u32,
     is_fit: bool,
@@ -93,7 +93,7 @@ fn zones(
 #[pyfunction]
 pub(crate) fn detector_range<'py>(
     py: Python<'py>,
-    described: Described,
+    described: BinsAndDescription,
     counts: PyReadonlyArray2<'py, u32>,
     crosstalk: Option<PyReadonlyArray2<'py, f64>>,
     false_alarm_rate: f64,
@@ -153,7 +153,7 @@ pub(crate) fn detector_range<'py>(
 #[pyfunction]
 pub(crate) fn detector_expected(
     py: Python<'_>,
-    described: Described,
+    described: BinsAndDescription,
     light: (f64, f64, f64),
 ) -> PyResult<Bound<'_, PyArray1<f64>>> {
     let (depth_m, photons, background) = light;
@@ -168,7 +168,7 @@ pub(crate) fn detector_expected(
 /// How well counts agree, zone by zone: χ², cells and chance; see `gdtof.Detector.check`.
 #[pyfunction]
 pub(crate) fn detector_agreement(
-    described: Described,
+    described: BinsAndDescription,
     counts: PyReadonlyArray2<'_, u32>,
     expected: PyReadonlyArray2<'_, f64>,
 ) -> PyResult<Vec<(f64, usize, f64)>> {

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use guided_dtof::request::{Spelling, check_drive_times};
 use guided_dtof::scene::PinholeCamera;
 use guided_dtof::system::{
-    Drive as Frames, DriveFrame, DriveSettings, FrameClock, Noise, WindowPolicy,
+    DriveFrame, DriveSettings, DriveSimulation as Frames, FrameClock, Noise, WindowPolicy,
 };
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -53,14 +53,14 @@ impl DriveKeys {
 }
 
 /// A frame and the edges of its bins.
-type Taken = (Box<DriveFrame>, Vec<f64>);
+type FrameAndEdges = (Box<DriveFrame>, Vec<f64>);
 
 /// What the thread of a drive and its asker share.
 struct Line {
     /// Asks for the next frame; closed when nobody will ask again.
     ask: Sender<()>,
     /// `None` while somebody waits for a frame.
-    take: Option<Receiver<Outcome<Taken>>>,
+    take: Option<Receiver<Outcome<FrameAndEdges>>>,
 }
 
 /// Frame after frame of a world in motion; see `gdtof.drive`.
@@ -137,7 +137,7 @@ impl Drive {
                 Ok(Err(failure)) => return drop(begin.send(Ok(Err(failure)))),
                 Err(panic) => return drop(begin.send(Err(panic))),
             };
-            go(&settings, &theirs, &begin, &asked, &give);
+            take_frames(&settings, &theirs, &begin, &asked, &give);
         })?;
         let (_, beginning) = wait(py, begun, &watch, None);
         let Beginning {
@@ -208,12 +208,12 @@ impl Drop for Drive {
 }
 
 /// Takes frames as long as they are asked for.
-fn go(
+fn take_frames(
     settings: &DriveSettings,
     watch: &Watch,
     begin: &SyncSender<Outcome<Beginning>>,
     asked: &Receiver<()>,
-    give: &SyncSender<Outcome<Taken>>,
+    give: &SyncSender<Outcome<FrameAndEdges>>,
 ) {
     let mut drive = match Frames::new(settings) {
         Ok(drive) => drive,
@@ -247,7 +247,7 @@ fn go(
 fn to_dict<'py>(
     py: Python<'py>,
     (shape, camera): ((usize, usize), PinholeCamera),
-    (frame, edges_ns): Taken,
+    (frame, edges_ns): FrameAndEdges,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (rows, cols) = shape;
     let summary = by_json(py, &frame.summary())?;

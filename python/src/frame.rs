@@ -7,7 +7,7 @@ use guided_dtof::engine::waveform::WaveCycles;
 use guided_dtof::request::FrameRequest;
 use guided_dtof::scene::PinholeCamera;
 use guided_dtof::system::{
-    FrameSettings, NoDepth, PixelDepth, Probe, WindowPolicy, take_frame_by, take_guided_frame,
+    FrameSettings, GateProbe, NoDepth, PixelDepth, WindowPolicy, take_frame_by, take_guided_frame,
 };
 use guided_dtof::{guide::GuideInput, units::Time};
 use numpy::PyReadonlyArrayDyn;
@@ -21,7 +21,7 @@ use crate::failure::Failure;
 use crate::guide::Guide;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
-use crate::taken::Taken;
+use crate::taken::FrameRecord;
 use crate::values::{by_json, to_table, typed};
 
 /// The library's request from keys of its own; None is a key that is left out.
@@ -77,12 +77,14 @@ impl Common {
         } = self;
         let (rows, cols) = shape;
         let bins = histograms.len() / (rows * cols);
-        let metres = |of: fn(&PixelDepth) -> Option<f64>| {
-            let values = pixels.iter().map(|pixel| of(pixel).unwrap_or(f64::NAN));
+        let metres = |distance: fn(&PixelDepth) -> Option<f64>| {
+            let values = pixels
+                .iter()
+                .map(|pixel| distance(pixel).unwrap_or(f64::NAN));
             map(py, shape, values.collect())
         };
         let point = |(at, pixel): (usize, &PixelDepth)| {
-            let towards = camera.towards((at / cols, at % cols));
+            let towards = camera.direction((at / cols, at % cols));
             pixel.measured_m.map(|m| (towards * m).to_array())
         };
         let points: Vec<[f64; 3]> = pixels.iter().enumerate().filter_map(point).collect();
@@ -122,7 +124,7 @@ struct Probes {
 }
 
 impl Probes {
-    fn probes(&self, sensor: &Chip) -> Result<Vec<Probe>, Failure> {
+    fn probes(&self, sensor: &Chip) -> Result<Vec<GateProbe>, Failure> {
         let wave_cycles = match self.cycles {
             None => WaveCycles::FirstHits,
             Some(-1) => WaveCycles::All,
@@ -144,7 +146,7 @@ impl Probes {
                 return Err(Failure::argument("probes", message));
             }
             let name = format!("probe_r{row}_c{col}.{}", self.format);
-            Ok(Probe {
+            Ok(GateProbe {
                 row,
                 col,
                 waves: self.folder.join(name),
@@ -246,7 +248,10 @@ pub(crate) fn frame<'py>(
     dict.set_item("load_s", seconds(frame.load_time))?;
     dict.set_item("exposure_s", seconds(frame.exposure_time))?;
     dict.set_item("readout_s", seconds(frame.readout_time))?;
-    dict.set_item("_taken", Taken::new(scene_name, request, settings, frame))?;
+    dict.set_item(
+        "_taken",
+        FrameRecord::new(scene_name, request, settings, frame),
+    )?;
     Ok(dict)
 }
 

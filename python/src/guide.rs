@@ -66,11 +66,11 @@ impl Guide {
     }
 
     /// All that it does follows from this: what it is, with every key, and every value of maps.
-    fn said(&self) -> String {
+    fn debug_text(&self) -> String {
         format!("{:?}", self.guide)
     }
 
-    fn of(parts: Vec<Part>) -> Result<Self, Failure> {
+    fn from_parts(parts: Vec<Part>) -> Result<Self, Failure> {
         if parts.len() > MOST_GUIDES {
             let message = format!("{} guides; give 1 to {MOST_GUIDES}", parts.len());
             return Err(Failure::argument("guide", message));
@@ -125,7 +125,7 @@ impl Guide {
                 Err(_) => parts.push(Part::Named(guide.cast::<PyString>()?.extract()?)),
             }
         }
-        Ok(Guide::of(parts)?)
+        Ok(Guide::from_parts(parts)?)
     }
 
     /// A map of one's own: distances along the ray, m, shape (rows, cols), NaN, infinite, 0 or masked where there is no estimate; `sigma_m` is the
@@ -165,7 +165,7 @@ impl Guide {
             sigma_m,
             range_m: values("range_m", &range_m, &[rows, cols])?,
         };
-        Ok(Guide::of(vec![Part::Map(Arc::new(own))])?)
+        Ok(Guide::from_parts(vec![Part::Map(Arc::new(own))])?)
     }
 
     /// What it is.
@@ -203,13 +203,13 @@ impl Guide {
         let other = other.cast::<Self>();
         other.is_ok_and(|other| {
             let other = other.get();
-            Arc::ptr_eq(&self.guide, &other.guide) || self.said() == other.said()
+            Arc::ptr_eq(&self.guide, &other.guide) || self.debug_text() == other.debug_text()
         })
     }
 
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
-        self.said().hash(&mut hasher);
+        self.debug_text().hash(&mut hasher);
         hasher.finish()
     }
 
@@ -234,7 +234,7 @@ impl Guide {
         }
         let parts = self.parts.iter().map(|part| match part {
             Part::Named(text) => Ok(PyString::new(py, text).into_any()),
-            Part::Map(_) => Ok(Bound::new(py, Guide::of(vec![part.clone()])?)?.into_any()),
+            Part::Map(_) => Ok(Bound::new(py, Guide::from_parts(vec![part.clone()])?)?.into_any()),
         });
         let parts = parts.collect::<PyResult<Vec<_>>>()?;
         Ok((class.into_any(), PyTuple::new(py, parts)?))

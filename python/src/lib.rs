@@ -49,7 +49,7 @@ mod _gdtof {
     #[pymodule_export]
     use super::sensor::Sensor;
     #[pymodule_export]
-    use super::taken::Taken;
+    use super::taken::FrameRecord;
 
     #[pymodule_export]
     use super::counts::range_counts;

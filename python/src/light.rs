@@ -41,7 +41,7 @@ struct Arrays {
 }
 
 impl Arrays {
-    fn of(&self, pixel: usize) -> Result<PixelLight, Failure> {
+    fn pixel_light(&self, pixel: usize) -> Result<PixelLight, Failure> {
         let amount = |name: &str, value: f64| {
             if value.is_finite() && value >= 0.0 {
                 Ok(value)
@@ -127,7 +127,7 @@ pub(crate) fn expose<'py>(
             Ok(LitPixel {
                 number: pixel as u32,
                 start: start.unwrap_or(farthest),
-                light: start.map(|_| arrays.of(pixel)).transpose()?,
+                light: start.map(|_| arrays.pixel_light(pixel)).transpose()?,
             })
         });
         let pixels = pixels.collect::<Result<Vec<LitPixel>, Failure>>()?;

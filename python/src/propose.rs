@@ -85,7 +85,7 @@ impl Problem {
         }
         let designs = self.0.clone();
         let (judged, timing) = run(py, None, move |_| {
-            let judged = designs.judge(&choice);
+            let judged = designs.evaluate(&choice);
             let timing = judged.as_ref().ok().and_then(|candidate| {
                 let config = designs.config_of(&candidate.point.design);
                 designs.timing(&config).err()

@@ -56,7 +56,7 @@ pub(crate) fn replay<'py>(
     let events = events(&sensor, &time_fs, &pixel, &spad)?;
     let shape = (sensor.rows, sensor.cols, sensor.bins);
     let (recording, histograms, cancel) = run(py, progress, move |watch| {
-        let recording = Recording::of(events, &sensor, &exposure);
+        let recording = Recording::from_events(events, &sensor, &exposure);
         watch.check()?;
         let pulses: Vec<&[SpadEvent]> = recording.pulses.iter().map(Vec::as_slice).collect();
         let pixels = PulsedPixel::array(&starts, &pulses);
@@ -139,7 +139,7 @@ fn with_waves(
     record(
         &mut simulation,
         waves,
-        WaveFormat::of(waves),
+        WaveFormat::from_path(waves),
         &view,
         &mut (),
     )?;

@@ -87,7 +87,7 @@ impl Scene {
     #[staticmethod]
     #[pyo3(signature = (sections, name="scene"))]
     fn from_dict(sections: &Bound<'_, PyDict>, name: &str) -> PyResult<Self> {
-        let document = Document::of(name, to_table(sections)?);
+        let document = Document::from_table(name, to_table(sections)?);
         Ok(Scene {
             world: World::read(&document).map_err(Failure::from)?,
             name: name.to_owned(),
@@ -126,7 +126,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let world = self.world.clone();
         let truth = run(py, None, move |_| {
-            Ok(GroundTruth::render(&world.at(time_s), rows, cols))
+            Ok(GroundTruth::render(&world.snapshot(time_s), rows, cols))
         })?;
         let metres = truth.range_m.iter().map(|m| m.unwrap_or(f64::NAN));
         Ok(map(py, (rows as usize, cols as usize), metres.collect()))

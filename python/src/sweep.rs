@@ -68,7 +68,7 @@ pub(crate) fn sweep_part<'py>(
         let study = read(&study, text.as_deref())?;
         let shard = Shard {
             part: shard.0,
-            of: shard.1,
+            parts: shard.1,
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|why| Failure::Simulation(why.to_string()))?;
@@ -91,7 +91,7 @@ pub(crate) fn sweep_table<'py>(py: Python<'py>, folder: PathBuf) -> PyResult<Bou
 fn write(folder: &Path) -> Result<(u64, u64), SweepError> {
     let study = study_of(folder)?;
     let set = ResultSet::begin(folder, "sweep")?;
-    let results = Results::of(&study, &[folder.to_owned()])?;
+    let results = Results::read(&study, &[folder.to_owned()])?;
     let missing = results.write(set.staging(), |_| ())?;
     let configuration = serde_json::json!({
         "study": study.text(),

@@ -20,13 +20,13 @@ use crate::failure::Failure;
 type Report = (String, String);
 
 /// What a frame's files say of it; see `gdtof.Frame.save`.
-#[pyclass(frozen, module = "gdtof._gdtof")]
-pub(crate) struct Taken {
+#[pyclass(frozen, module = "gdtof._gdtof", name = "Taken")]
+pub(crate) struct FrameRecord {
     /// Made when it is asked for: most frames are never saved.
     report: LazyLock<Report, Box<dyn FnOnce() -> Report + Send + Sync>>,
 }
 
-impl Taken {
+impl FrameRecord {
     /// Of a frame without its histograms, which have gone to Python.
     pub(crate) fn new(
         scene_name: String,
@@ -35,25 +35,26 @@ impl Taken {
         frame: Frame,
     ) -> Self {
         let report = move || {
-            let silicon = Silicon::of(&settings.sensor);
-            let timing = TimingVerdict::of(&settings.sensor, &silicon, (0, 0)).report();
-            let of = (&request, &settings, &timing, &frame);
-            let report = FrameReport::<()>::new(scene_name, of.0, of.1, of.2, of.3, None);
+            let silicon = Silicon::new(&settings.sensor);
+            let timing = TimingVerdict::analyse(&settings.sensor, &silicon, (0, 0)).report();
+            let parts = (&request, &settings, &timing, &frame);
+            let report =
+                FrameReport::<()>::new(scene_name, parts.0, parts.1, parts.2, parts.3, None);
             let text = |json: serde_json::Result<String>| json.expect("a report is JSON");
             let configuration = serde_json::to_string(&report.configuration);
             (text(serde_json::to_string(&report)), text(configuration))
         };
-        Taken {
+        FrameRecord {
             report: LazyLock::new(Box::new(report)),
         }
     }
 }
 
 #[pymethods]
-impl Taken {
+impl FrameRecord {
     #[new]
-    fn of(report: String, configuration: String) -> Self {
-        Taken {
+    fn unpickled(report: String, configuration: String) -> Self {
+        FrameRecord {
             report: LazyLock::new(Box::new(|| (report, configuration))),
         }
     }

@@ -2,9 +2,9 @@
 
 use guided_dtof::theory::cycles::laser_cycles_for;
 use guided_dtof::theory::design::{Design, StereoPair};
-use guided_dtof::theory::detection::{self, Model, PerCycle, Ties};
+use guided_dtof::theory::detection::{self, DetectionModel, PerCycle, Ties};
 use guided_dtof::theory::front_ends;
-use guided_dtof::theory::partial::{Goal, Link, Models, System};
+use guided_dtof::theory::partial::{Link, Models, RangingGoal, System};
 use guided_dtof::theory::precision;
 use guided_dtof::theory::significance::Scan;
 use guided_dtof::units::SPEED_OF_LIGHT_M_PER_S;
@@ -21,16 +21,16 @@ const CHUNK: usize = 16;
 /// A formula, given a row of its arguments.
 type Formula = Box<dyn Fn(&[f64]) -> f64 + Send + Sync>;
 
-fn model(name: &str) -> Result<Model, Failure> {
+fn model(name: &str) -> Result<DetectionModel, Failure> {
     Ok(match name {
-        "poisson" => Model::Poisson(Ties::Random),
-        "poisson_strict" => Model::Poisson(Ties::Strict),
-        "poisson_loose" => Model::Poisson(Ties::Loose),
-        "bernoulli" => Model::Bernoulli(Ties::Random),
-        "bernoulli_strict" => Model::Bernoulli(Ties::Strict),
-        "bernoulli_loose" => Model::Bernoulli(Ties::Loose),
-        "gaussian" => Model::Gaussian,
-        "gaussian_as_printed" => Model::GaussianAsPrinted,
+        "poisson" => DetectionModel::Poisson(Ties::Random),
+        "poisson_strict" => DetectionModel::Poisson(Ties::Strict),
+        "poisson_loose" => DetectionModel::Poisson(Ties::Loose),
+        "bernoulli" => DetectionModel::Bernoulli(Ties::Random),
+        "bernoulli_strict" => DetectionModel::Bernoulli(Ties::Strict),
+        "bernoulli_loose" => DetectionModel::Bernoulli(Ties::Loose),
+        "gaussian" => DetectionModel::Gaussian,
+        "gaussian_as_printed" => DetectionModel::GaussianAsPrinted,
         _ => {
             let message = format!(
                 "{name:?} is no model; give poisson, bernoulli (with _strict or _loose for ties), gaussian or gaussian_as_printed"
@@ -48,7 +48,11 @@ fn light(row: &[f64]) -> PerCycle {
     }
 }
 
-fn system(row: &[f64], detection: Model, precision: fn(f64, f64, f64, f64) -> f64) -> System {
+fn system(
+    row: &[f64],
+    detection: DetectionModel,
+    precision: fn(f64, f64, f64, f64) -> f64,
+) -> System {
     let &[
         _,
         signal,
@@ -68,7 +72,7 @@ fn system(row: &[f64], detection: Model, precision: fn(f64, f64, f64, f64) -> f6
         background_hz,
         pulse_sigma_s,
     };
-    let goal = Goal {
+    let goal = RangingGoal {
         precision_m,
         detection: probability,
     };
@@ -82,28 +86,28 @@ fn system(row: &[f64], detection: Model, precision: fn(f64, f64, f64, f64) -> f6
 /// A formula by its name, and how many arguments it takes.
 fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
     let word = |at: usize| words.get(at).map_or("", String::as_str);
-    fn boxed(of: impl Fn(&[f64]) -> f64 + Send + Sync + 'static) -> Formula {
-        Box::new(of)
+    fn boxed(formula: impl Fn(&[f64]) -> f64 + Send + Sync + 'static) -> Formula {
+        Box::new(formula)
     }
     Ok(match name {
         "detection_probability" => {
             let model = model(word(0))?;
-            let of =
+            let probability =
                 move |r: &[f64]| detection::probability(&light(r), r[3] as u64, model).probability;
-            (4, boxed(of))
+            (4, boxed(probability))
         }
         "miss_probability" => {
             let model = model(word(0))?;
-            let of = move |r: &[f64]| detection::probability(&light(r), r[3] as u64, model).miss;
-            (4, boxed(of))
+            let miss = move |r: &[f64]| detection::probability(&light(r), r[3] as u64, model).miss;
+            (4, boxed(miss))
         }
         "laser_cycles_for" => {
             let model = model(word(0))?;
-            let of = move |r: &[f64]| {
+            let laser_cycles = move |r: &[f64]| {
                 let cycles = laser_cycles_for(r[3], &light(r), model);
                 cycles.map_or(f64::NAN, |cycles| cycles as f64)
             };
-            (4, boxed(of))
+            (4, boxed(laser_cycles))
         }
         "thompson" => (4, boxed(|r| precision::thompson(r[0], r[1], r[2], r[3]))),
         "cramer_rao" => (4, boxed(|r| precision::cramer_rao(r[0], r[1], r[2], r[3]))),
@@ -126,7 +130,7 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
                 let message = format!("{scheme:?} is no scheme; give full, zooming or sliding");
                 return Err(Failure::argument("scheme", message));
             }
-            let of = move |r: &[f64]| {
+            let laser_cycles = move |r: &[f64]| {
                 let system = system(r, detection, precision);
                 let cost = match scheme.as_str() {
                     "full" => system.full(r[0]),
@@ -135,10 +139,10 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
                 };
                 cost.laser_cycles()
             };
-            (9, boxed(of))
+            (9, boxed(laser_cycles))
         }
         "tolerated_sigma_m" => {
-            let of = |r: &[f64]| {
+            let tolerated_sigma_m = |r: &[f64]| {
                 let design = Design {
                     counter_bits: 1,
                     bins: r[1] as u32,
@@ -147,17 +151,17 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
                 };
                 design.tolerated_sigma_m()
             };
-            (2, boxed(of))
+            (2, boxed(tolerated_sigma_m))
         }
         "stereo_depth_error_m" => {
-            let of = |r: &[f64]| {
+            let depth_error_m = |r: &[f64]| {
                 let pair = StereoPair {
                     focal_px: r[2],
                     baseline_m: r[3],
                 };
                 pair.depth_error_m(r[0], r[1])
             };
-            (4, boxed(of))
+            (4, boxed(depth_error_m))
         }
         "non_paralysable_hz" => (2, boxed(|r| front_ends::non_paralysable_hz(r[0], r[1]))),
         "paralysable_hz" => (2, boxed(|r| front_ends::paralysable_hz(r[0], r[1]))),

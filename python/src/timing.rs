@@ -38,7 +38,7 @@ pub(crate) fn timing<'py>(
         voltage_v,
         temperature_c: temperature_c.unwrap_or(sensor.conditions().temperature_c),
     };
-    let silicon = Silicon::of(&sensor).in_conditions(conditions);
+    let silicon = Silicon::new(&sensor).in_conditions(conditions);
     let silicon = silicon.map_err(|why| {
         let arguments = match why {
             UnknownConditions::OfLibrary => "process, voltage_v, temperature_c",
@@ -47,7 +47,7 @@ pub(crate) fn timing<'py>(
         Failure::argument(arguments, why.to_string())
     })?;
     let (verdict, chip, clk_period) = run(py, None, move |_| {
-        let verdict = TimingVerdict::of(&sensor, &silicon, (0, 0));
+        let verdict = TimingVerdict::analyse(&sensor, &silicon, (0, 0));
         Ok((
             verdict,
             ChipTiming::measure(&sensor, &silicon),

@@ -186,10 +186,10 @@ pub(crate) fn by_json<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<
 ///
 /// # Errors
 /// Values that are none.
-pub(crate) fn assignments(of: &str, dict: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
+pub(crate) fn assignments(prefix: &str, dict: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
     let assignment = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let key: String = key.extract()?;
-        Ok(format!("{of}{key}={}", to_toml(&value)?))
+        Ok(format!("{prefix}{key}={}", to_toml(&value)?))
     };
     dict.into_iter().flatten().map(assignment).collect()
 }
@@ -203,7 +203,7 @@ pub(crate) fn reassigned(
     table: Table,
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Document> {
-    let mut document = Document::of(name, table);
+    let mut document = Document::from_table(name, table);
     for assignment in assignments("", keys)? {
         let place = format!("with_({assignment})");
         document

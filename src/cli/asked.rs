@@ -38,7 +38,7 @@ pub(super) struct ExposureArgs {
 impl ExposureArgs {
     /// The request with these options, and defaults for everything else.
     pub(super) fn request(&self) -> FrameRequest {
-        self.guiding.ask(FrameRequest {
+        self.guiding.add_to(FrameRequest {
             stop_periods: self.stop_periods,
             laser_cycles: self.laser_cycles,
             seed: self.seed,
@@ -145,7 +145,7 @@ pub(super) struct GuideArgs {
 
 impl GuideArgs {
     /// Adds guide and windows to a request.
-    pub(super) fn ask(&self, request: FrameRequest) -> FrameRequest {
+    pub(super) fn add_to(&self, request: FrameRequest) -> FrameRequest {
         FrameRequest {
             guides: self.guides.clone(),
             windows: self.windows.clone().unwrap_or_default(),

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::{progress, tell};
+use super::voice::{progress, say_unless_quiet};
 use crate::chip::{Tdc, WindowLaw};
 use crate::files::{InputError, OutputFile, refuse_input};
 use crate::numerics::intervals::mean_and_sigma;
 use crate::report::Table;
 use crate::request::{self, Spelling};
-use crate::system::{Calibrated, Sweep, SweepError, calibrate};
+use crate::system::{BinCalibration, BinSweepError, Sweep, calibrate};
 use crate::units::Time;
 
 /// Arguments of `gdtof calibrate`.
@@ -84,22 +84,22 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let found = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1));
     progress.finish_and_clear();
     let found = match found {
-        Err(why @ SweepError::NoWindow { .. }) => {
+        Err(why @ BinSweepError::NoWindow { .. }) => {
             let message = format!("{why}; give a longer laser cycle, or more counter_bits");
             return Err(InputError::new("--stop-periods", message).into());
         }
-        Err(SweepError::Engine(why)) => return Err(why.into()),
+        Err(BinSweepError::Engine(why)) => return Err(why.into()),
         Ok(found) => found,
     };
     OutputFile::write_with(&args.out, |out| {
         serde_json::to_writer(&mut *out, &found.profile)?;
         writeln!(out)
     })?;
-    tell(table(&found))?;
+    say_unless_quiet(table(&found))?;
     Ok(())
 }
 
-fn table(found: &Calibrated) -> Table {
+fn table(found: &BinCalibration) -> Table {
     let profile = &found.profile;
     let mut table = Table::new("Bins found");
     for (line, name) in ["even", "odd"].into_iter().enumerate() {
@@ -110,19 +110,19 @@ fn table(found: &Calibrated) -> Table {
         let lengths: Vec<f64> = lengths.map(|s| s * 1e12).collect();
         let (mean, sigma) = mean_and_sigma(&lengths);
         let bound = |f: fn(f64, f64) -> f64| lengths.iter().copied().reduce(f).unwrap_or(mean);
-        let of = format!("{name} windows");
+        let row_name = format!("{name} windows");
         let windows = match found.windows[line] {
             1 => "1 window".to_owned(),
             windows => format!("mean of {windows} windows"),
         };
-        table.push(&of, format!("{} bins, {windows}", lengths.len()));
+        table.push(&row_name, format!("{} bins, {windows}", lengths.len()));
         table.push(
-            format!("{of}, length"),
+            format!("{row_name}, length"),
             format!("{mean:.1} ps, σ {sigma:.1} ps"),
         );
         let (least, most) = (bound(f64::min), bound(f64::max));
         table.push(
-            format!("{of}, least and most"),
+            format!("{row_name}, least and most"),
             format!("{least:.0} and {most:.0} ps"),
         );
     }

@@ -6,9 +6,9 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::voice::{announce, notes, progress, tell};
-use crate::demo::disturbed::{Disturbance, Outcome};
-use crate::demo::show::{Show, Shown};
+use super::voice::{announce, notes, progress, say_unless_quiet};
+use crate::demo::disturbed::{Disturbance, DisturbanceOutcome};
+use crate::demo::show::{Show, ShowResult};
 use crate::demo::{Demonstrator, limit, shows, sweep};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::{BehaviouralStereo, Guide, options};
@@ -198,7 +198,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         began.elapsed().as_secs_f64(),
         out.display(),
     );
-    Ok(tell(text)?)
+    Ok(say_unless_quiet(text)?)
 }
 
 fn file_names(folder: &Path) -> std::io::Result<String> {
@@ -211,7 +211,7 @@ fn file_names(folder: &Path) -> std::io::Result<String> {
 }
 
 /// Pictures, point clouds, and what became of the targets.
-fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<String> {
+fn write_shown(folder: &Path, show: &Show, shown: &ShowResult) -> anyhow::Result<String> {
     let name = &show.name;
     for (number, picture) in &shown.pictures {
         picture.write_png(&folder.join(format!("{name}_{number:03}.png")))?;
@@ -274,7 +274,11 @@ fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String
 }
 
 /// What a disturbance costs each scheme.
-fn write_disturbed(folder: &Path, name: &str, outcomes: &[Outcome]) -> anyhow::Result<String> {
+fn write_disturbed(
+    folder: &Path,
+    name: &str,
+    outcomes: &[DisturbanceOutcome],
+) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(outcomes)?;
     OutputFile::write_text(&folder.join("outcomes.json"), &(json + "\n"))?;
     let mut grid = Grid::headed(&format!(

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use clap::Args;
 use serde::Serialize;
 
-use super::voice::{say_json, tell};
+use super::voice::{say_json, say_unless_quiet};
 use crate::report::Table;
 
 /// Arguments of `gdtof doctor`.
@@ -91,7 +91,7 @@ pub(super) fn run(args: &DoctorArgs) -> anyhow::Result<()> {
         let found = tool.version.as_deref().unwrap_or("not found");
         table.push(tool.name, format!("{found}; for {}", tool.used_for));
     }
-    Ok(tell(table)?)
+    Ok(say_unless_quiet(table)?)
 }
 
 /// The version that a tool prints, or just that it is there.

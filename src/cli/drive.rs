@@ -11,14 +11,14 @@ use serde::Serialize;
 use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
-use super::voice::{announce, notes, progress, say_file, tell};
-use crate::engine::Work;
+use super::voice::{announce, notes, progress, say_file, say_unless_quiet};
+use crate::engine::EngineWork;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
-use crate::report::{Cell, DepthMap, NpyStack, Table};
-use crate::request::{Exposed, Spelling, check_drive_times};
+use crate::report::{DepthImage, ImageCell, NpyStack, Table};
+use crate::request::{ExposureReport, Spelling, check_drive_times};
 use crate::system::{
-    Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, NoDepth, Noise, PhaseTimes, Reused,
-    Summary, WindowPolicy,
+    DriveFrame, DriveReuse, DriveSettings, DriveSimulation, FrameClock, FrameSummary, FrameTimes,
+    NoDepth, Noise, PhaseTimes, WindowPolicy,
 };
 
 /// Arguments of `gdtof drive`.
@@ -84,9 +84,9 @@ pub(super) struct DriveArgs {
 struct FrameLine<'a> {
     number: u32,
     times: FrameTimes,
-    summary: Summary,
-    reused: Reused,
-    work: Work,
+    summary: FrameSummary,
+    reused: DriveReuse,
+    work: EngineWork,
     run_times: PhaseTimes,
     /// Degrees outwards.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -115,7 +115,7 @@ struct Report<'a> {
     views_reused: u64,
     depths: u64,
     outliers: u64,
-    work: Work,
+    work: EngineWork,
     run_time_s: f64,
 }
 
@@ -123,7 +123,7 @@ struct Report<'a> {
 #[derive(Serialize)]
 struct Configuration<'a> {
     #[serde(flatten)]
-    exposed: Exposed<'a>,
+    exposed: ExposureReport<'a>,
     /// As they were asked for; none for the camera pair.
     guides: &'a [String],
     windows: WindowPolicy,
@@ -180,7 +180,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     };
     let results = ResultSet::begin(&args.out, "drive")?;
     let began = Instant::now();
-    let mut drive = Drive::new(&settings)?;
+    let mut drive = DriveSimulation::new(&settings)?;
     let [load_s, exposure_s, readout_s] = drive.chip_s();
     let mut report = Report {
         version: env!("CARGO_PKG_VERSION"),
@@ -199,7 +199,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         views_reused: 0,
         depths: 0,
         outliers: 0,
-        work: Work::default(),
+        work: EngineWork::default(),
         run_time_s: 0.0,
     };
     let mut recording = Recording::begin(results.staging(), &settings, args.frames)?;
@@ -248,7 +248,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     if args.json {
         Ok(say_file(format_args!("{json}\n"))?)
     } else {
-        Ok(tell(report.table(&args.out))?)
+        Ok(say_unless_quiet(report.table(&args.out))?)
     }
 }
 
@@ -268,7 +268,7 @@ impl Report<'_> {
 
     fn table(&self, out: &Path) -> Table {
         let ms = |s: f64| format!("{:.2} ms", 1e3 * s);
-        let of = |part: u64, whole: u64| format!("{part} of {whole}");
+        let part_of_whole = |part: u64, whole: u64| format!("{part} of {whole}");
         let clock = self.configuration.clock;
         let mut table = Table::new(format!(
             "{} frames of {}",
@@ -293,19 +293,19 @@ impl Report<'_> {
         .row("photons drawn", self.work.photons_drawn)
         .row(
             "CLK periods visited",
-            of(self.work.clk_periods_visited, self.work.clk_periods),
+            part_of_whole(self.work.clk_periods_visited, self.work.clk_periods),
         )
         .row(
             "macropixels not exposed again",
-            of(self.macropixels_reused, self.macropixels),
+            part_of_whole(self.macropixels_reused, self.macropixels),
         )
         .row(
             "loads not run again",
-            of(self.loads_reused.into(), self.frames.into()),
+            part_of_whole(self.loads_reused.into(), self.frames.into()),
         )
         .row(
             "macropixels' views not cast again",
-            of(self.views_reused, self.views),
+            part_of_whole(self.views_reused, self.views),
         );
         let each = ms(self.run_time_s / f64::from(self.frames));
         table.push(
@@ -403,12 +403,12 @@ impl Recording {
 
 /// The frame's depths as a picture; all frames of a drive have the scale of what its guide can see.
 fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Result<(), InputError> {
-    let cells: Vec<Cell> = frame
+    let cells: Vec<ImageCell> = frame
         .pixels
         .iter()
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
-            (Some(m), _) => Cell::Depth(m as f32),
-            (None, why) => Cell::Category(why.map_or(0, |why| why as usize)),
+            (Some(m), _) => ImageCell::Depth(m as f32),
+            (None, why) => ImageCell::Category(why.map_or(0, |why| why as usize)),
         })
         .collect();
     let stereo = &settings.frame.scene.stereo;
@@ -419,7 +419,7 @@ fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Resul
         frame.number,
         frame.times.middle_s()
     );
-    DepthMap {
+    DepthImage {
         title: &title,
         cols: settings.frame.sensor.cols,
         cells: &cells,

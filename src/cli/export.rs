@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::replay::Stimuli;
-use super::voice::{notes, tell};
+use super::voice::{notes, say_unless_quiet};
 use super::{SensorArgs, export_frame, mapped, sdf};
 use crate::chip::{SensorConfig, array};
 use crate::files::{InputError, ResultSet};
@@ -84,7 +84,7 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
     ) else {
         let (plan, timing) = (None, None);
         write(args, Export { top, plan, timing }, &sensor)?;
-        tell(format_args!(
+        say_unless_quiet(format_args!(
             "design.v, cells.v and cells_specify.v in {folder}; for a testbench, add --inits, --events, --stop-periods and --laser-cycles\n"
         ))?;
         return Ok(());
@@ -109,7 +109,7 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
     let timing = timing.transpose()?;
     let (plan, timing) = (Some(&plan), timing.as_ref());
     write(args, Export { top, plan, timing }, &stimuli.sensor)?;
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "cd {folder} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim\n"
     ))?;
     Ok(())

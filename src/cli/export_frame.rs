@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::voice::{notes, tell};
+use super::voice::{notes, say_unless_quiet};
 use crate::files::{InputError, ResultSet, read_counts};
 use crate::report::{Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
-use crate::system::{NoDepth, PixelDepth, RETURNS, Return, TakenFrame, cloud};
+use crate::system::{DepthReturn, NoDepth, PixelDepth, RETURNS, TakenFrame, cloud};
 
 /// Arguments of `gdtof export frame`.
 #[derive(Args)]
@@ -63,7 +63,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
 
     let camera = settings.scene.lidar_camera(rows as u32, cols as u32);
     let points = cloud(&camera, cols, &pixels);
-    let depths = of(&pixels, |pixel| pixel.measured_m);
+    let depths = pixel_values(&pixels, |pixel| pixel.measured_m);
 
     let results = ResultSet::begin(&args.out, "export frame")?;
     let all = Format::value_variants();
@@ -94,7 +94,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let frame = args.frame.display().to_string();
     notes(results.commit(serde_json::json!({ "frame": frame }))?);
     let found = depths.iter().filter(|depth| depth.is_finite()).count();
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "{} in {}: {found} of {} macropixels have a depth\n",
         names.join(", "),
         args.out.display(),
@@ -104,7 +104,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
 }
 
 /// A number of each macropixel; not a number where there is none.
-fn of(pixels: &[PixelDepth], number: impl Fn(&PixelDepth) -> Option<f64>) -> Vec<f32> {
+fn pixel_values(pixels: &[PixelDepth], number: impl Fn(&PixelDepth) -> Option<f64>) -> Vec<f32> {
     let number = |pixel| number(pixel).map_or(f32::NAN, |x| x as f32);
     pixels.iter().map(number).collect()
 }
@@ -125,12 +125,12 @@ fn whole(pixels: &[PixelDepth], histograms: &[u16], [rows, cols, bins]: [usize; 
         ("peak_m", |m| m.peak_m),
         ("confidence", |m| m.confidence),
     ] {
-        arrays.add(name, &shape, &of(pixels, number));
+        arrays.add(name, &shape, &pixel_values(pixels, number));
     }
     for (name, number) in [
         (
             "returns_m",
-            (|r| Some(r.depth_m)) as fn(&Return) -> Option<f64>,
+            (|r| Some(r.depth_m)) as fn(&DepthReturn) -> Option<f64>,
         ),
         ("returns_bound_m", |r| r.bound_m),
         ("returns_photons", |r| Some(r.photons)),

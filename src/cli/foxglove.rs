@@ -135,7 +135,9 @@ impl Foxglove {
             .filter(shown)
             .filter_map(|pixel| {
                 let (from_m, to_m) = frame.windows_m[pixel]?;
-                let ray = self.camera.towards((pixel / self.cols, pixel % self.cols));
+                let ray = self
+                    .camera
+                    .direction((pixel / self.cols, pixel % self.cols));
                 Some([from_m, to_m].map(|m| xyz(ray * m)))
             });
         let none = json!([]);
@@ -178,8 +180,8 @@ fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
-        let of = |at: usize| u32::from(chunk.get(at).copied().unwrap_or(0));
-        let word = of(0) << 16 | of(1) << 8 | of(2);
+        let byte = |at: usize| u32::from(chunk.get(at).copied().unwrap_or(0));
+        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
         for letter in 0..4 {
             text.push(if letter <= chunk.len() {
                 LETTERS[(word >> (18 - 6 * letter)) as usize & 63] as char

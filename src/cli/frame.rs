@@ -10,7 +10,7 @@ use clap::Args;
 
 use self::pair::PairReport;
 use super::asked::{ExposureArgs, WaveFormatOption};
-use super::voice::{note, notes, progress, say_json, tell};
+use super::voice::{note, notes, progress, say_json, say_unless_quiet};
 use super::{SceneArgs, asked};
 use crate::analysis::TimingVerdict;
 use crate::chip::{SensorConfig, Silicon};
@@ -19,7 +19,7 @@ use crate::files::{InputError, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
 use crate::request::{FrameReport, FrameRequest};
-use crate::system::{Probe, WindowPolicy, take_frame_by};
+use crate::system::{GateProbe, WindowPolicy, take_frame_by};
 use crate::waves::WaveFormat;
 
 /// Arguments of `gdtof frame`.
@@ -79,7 +79,7 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
     args.scene = args.scene.or_file(args.world.take());
     let args = &args;
     let (sensor, scene) = args.scene.read()?;
-    let pair = args.pair.take(&sensor, scene.clone(), &args.out)?;
+    let pair = args.pair.match_pair(&sensor, scene.clone(), &args.out)?;
     let scene = pair.as_ref().map_or(scene, |pair| pair.scene.clone());
     let request = args.request();
     let policy = request.policy(WindowPolicy::default())?;
@@ -89,13 +89,13 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
     };
     let chosen = chosen_probes(&args.probe, &sensor)?;
     let settings = request.settings_by(sensor, scene, guide, &policy)?;
-    let silicon = Silicon::of(&settings.sensor);
-    let timing = TimingVerdict::of(&settings.sensor, &silicon, (0, 0)).report();
+    let silicon = Silicon::new(&settings.sensor);
+    let timing = TimingVerdict::analyse(&settings.sensor, &silicon, (0, 0)).report();
     if let Some(warning) = timing.warning() {
         note(warning);
     }
     let results = ResultSet::begin(&args.out, "frame")?;
-    let probe_at = |(row, col)| Probe {
+    let probe_at = |(row, col)| GateProbe {
         row,
         col,
         waves: results.staging().join(wave_name(args, (row, col))),
@@ -126,7 +126,7 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
     let report = FrameReport::new(name, &request, &settings, &timing, &frame, pair_report);
     report.write(results.staging(), &frame.histograms)?;
     if args.page {
-        let page = Page::of(results.staging(), &args.out, 1)?;
+        let page = Page::read(results.staging(), &args.out, 1)?;
         page.write(&results.staging().join("page.html"))?;
     }
     if let Some(pair) = &pair {
@@ -145,18 +145,18 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
         if let Some(pair) = pair_report {
             pair.rows(&mut table);
         }
-        tell(table)?;
+        say_unless_quiet(table)?;
         if let Some(note) = pair_report.and_then(PairReport::note) {
-            tell(format_args!("\n{note}\n"))?;
+            say_unless_quiet(format_args!("\n{note}\n"))?;
         }
         if let Some(remark) = &frame.remark {
-            tell(format_args!("\n{remark}\n"))?;
+            say_unless_quiet(format_args!("\n{remark}\n"))?;
         }
         for hint in &frame.hints {
-            tell(format_args!("\n{hint}\n"))?;
+            say_unless_quiet(format_args!("\n{hint}\n"))?;
         }
         for note in &timing.notes {
-            tell(format_args!("\nNote on timing: {note}\n"))?;
+            say_unless_quiet(format_args!("\nNote on timing: {note}\n"))?;
         }
     }
     Ok(())

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::{note, notes, tell};
+use super::voice::{note, notes, say_unless_quiet};
 use crate::chip::{CellLibrary, FromFile, Probes, SensorConfig, macropixel};
 use crate::files::{InputError, OutputFile, ResultSet};
 use crate::liberty::{
-    Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
+    CharacterisedNetlist, Clocking, write_constraints, write_mapped, write_mapped_cells,
+    write_mapped_sdf,
 };
 use crate::netlist::Netlist;
 
@@ -24,18 +25,18 @@ pub(super) struct SdcArgs {
 }
 
 /// A macropixel, sized and timed.
-struct Mapped<'c> {
+struct MappedMacropixel<'c> {
     config: &'c SensorConfig,
     cells: &'static FromFile,
     netlist: Netlist,
-    characterised: Characterised,
+    characterised: CharacterisedNetlist,
 }
 
-impl<'c> Mapped<'c> {
+impl<'c> MappedMacropixel<'c> {
     /// # Errors
     /// A sensor of the built-in cells.
-    fn of(config: &'c SensorConfig, option: &str) -> Result<Self, InputError> {
-        let cells = CellLibrary::of(config)
+    fn new(config: &'c SensorConfig, option: &str) -> Result<Self, InputError> {
+        let cells = CellLibrary::from_config(config)
             .ok()
             .and_then(CellLibrary::from_file);
         let Some(cells) = cells else {
@@ -47,7 +48,7 @@ impl<'c> Mapped<'c> {
         for sentence in &cells.liberty.map.notes {
             note(sentence);
         }
-        Ok(Mapped {
+        Ok(MappedMacropixel {
             config,
             cells,
             netlist,
@@ -76,8 +77,8 @@ impl<'c> Mapped<'c> {
 /// Bad input and unwritable output.
 pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
-    Mapped::of(&config, "export sdc")?.write_sdc(&args.out)?;
-    tell(format_args!("{}\n", args.out.display()))?;
+    MappedMacropixel::new(&config, "export sdc")?.write_sdc(&args.out)?;
+    say_unless_quiet(format_args!("{}\n", args.out.display()))?;
     Ok(())
 }
 
@@ -86,8 +87,8 @@ pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
 /// # Errors
 /// A sensor of the built-in cells, and unwritable output.
 pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> {
-    let mapped = Mapped::of(config, "--mapped")?;
-    let Mapped {
+    let mapped = MappedMacropixel::new(config, "--mapped")?;
+    let MappedMacropixel {
         cells,
         netlist,
         characterised,
@@ -107,7 +108,7 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
     mapped.write_sdc(&file("mapped.sdc"))?;
     notes(set.commit(config)?);
     let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, 0);
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0} um2, leakage {:.3} nW\n",
         folder.display(),
         netlist.cells().len(),

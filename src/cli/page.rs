@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::voice::{busy, say_json, tell};
+use super::voice::{busy, say_json, say_unless_quiet};
 use crate::page::Page;
 use crate::report::Table;
 
@@ -40,7 +40,7 @@ struct Report<'a> {
 /// Bad input and unwritable output.
 pub(super) fn run(args: &PageArgs) -> anyhow::Result<()> {
     let busy = busy("making the page");
-    let page = Page::of(&args.folder, &args.folder, args.every as usize)?;
+    let page = Page::read(&args.folder, &args.folder, args.every as usize)?;
     page.write(&args.out)?;
     drop(busy);
     let report = Report {
@@ -55,5 +55,5 @@ pub(super) fn run(args: &PageArgs) -> anyhow::Result<()> {
         .row("frames", report.frames)
         .row("size", format!("{:.1} MB", report.bytes as f64 / 1e6))
         .row("open in a browser", args.out.display());
-    Ok(tell(table)?)
+    Ok(say_unless_quiet(table)?)
 }

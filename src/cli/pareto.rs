@@ -6,13 +6,15 @@ use clap::Args;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::voice::{announce, notes, progress, say_json, tell};
+use super::voice::{announce, notes, progress, say_json, say_unless_quiet};
 use crate::chip::SensorConfig;
 use crate::engine::EngineError;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Axis, Chart, Grid, aligned, width};
 use crate::request::{self, Spelling};
-use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
+use crate::system::pareto::{
+    Done, GATE_CYCLES, Method, MethodSummary, ParetoPoint, ParetoSettings, summarise,
+};
 
 /// Arguments of `gdtof pareto`.
 #[derive(Args)]
@@ -61,8 +63,8 @@ struct Report<'a> {
     laser_cycles: u32,
     stop_periods: u32,
     macropixels: usize,
-    methods: &'a [Summary],
-    cells: &'a [Point],
+    methods: &'a [MethodSummary],
+    cells: &'a [ParetoPoint],
 }
 
 /// Runs the command.
@@ -91,7 +93,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
     );
     let rows = (!args.json).then(|| Rows::new(&methods));
     if let Some(rows) = &rows {
-        bar.suspend(|| tell(head(args, &settings, cells) + &rows.headings()))?;
+        bar.suspend(|| say_unless_quiet(head(args, &settings, cells) + &rows.headings()))?;
     }
     let mut summaries = Vec::new();
     let mut said = Ok(());
@@ -100,7 +102,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         Done::Method(points) => {
             let summary = summarise(points).expect("there is a wall");
             if let (Some(rows), Ok(())) = (&rows, &said) {
-                said = bar.suspend(|| tell(rows.row(&summary)));
+                said = bar.suspend(|| say_unless_quiet(rows.row(&summary)));
             }
             summaries.push(summary);
         }
@@ -133,7 +135,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         };
         say_json(&report)?;
     } else {
-        tell(foot(args, &settings))?;
+        say_unless_quiet(foot(args, &settings))?;
     }
     Ok(())
 }
@@ -185,7 +187,7 @@ fn settings(args: &ParetoArgs) -> Result<ParetoSettings, InputError> {
     })
 }
 
-fn write_cells(path: &Path, points: &[Point]) -> Result<(), InputError> {
+fn write_cells(path: &Path, points: &[ParetoPoint]) -> Result<(), InputError> {
     OutputFile::write_with(path, |out| {
         let mut cells = Grid::headed(
             "method | against_cycle | range_m | illuminance_klux | run_time_ns | speed_up \
@@ -214,7 +216,7 @@ fn write_cells(path: &Path, points: &[Point]) -> Result<(), InputError> {
 /// Depth errors below this are drawn here: equal results have no place on a logarithmic axis.
 const FLOOR_M: f64 = 1e-4;
 
-fn chart(settings: &ParetoSettings, summaries: &[Summary]) -> Chart {
+fn chart(settings: &ParetoSettings, summaries: &[MethodSummary]) -> Chart {
     let title = format!(
         "Run time against error, {} laser cycles; errors of 0 are drawn at {FLOOR_M:e} m",
         settings.laser_cycles
@@ -299,7 +301,7 @@ impl Rows {
         aligned(&HEADINGS.map(str::to_owned), &self.widths)
     }
 
-    fn row(&self, summary: &Summary) -> String {
+    fn row(&self, summary: &MethodSummary) -> String {
         let worst = &summary.worst;
         let pair = |median: f64, worst: f64, decimals: usize| {
             format!("{median:.decimals$} / {worst:.decimals$}")

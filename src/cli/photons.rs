@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::voice::{note, notes, progress, say_json, tell};
+use super::voice::{note, notes, progress, say_json, say_unless_quiet};
 use super::{SceneArgs, asked};
 use crate::chip::Sensor;
 use crate::files::{InputError, OutputFile, ResultSet};
@@ -189,7 +189,7 @@ pub(super) fn run(mut args: PhotonsArgs) -> anyhow::Result<()> {
     if args.json {
         return say_json(&report);
     }
-    Ok(tell(report.table(args, frame.is_some()))?)
+    Ok(say_unless_quiet(report.table(args, frame.is_some()))?)
 }
 
 impl PhotonsArgs {

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::{busy, say_json, tell};
+use super::voice::{busy, say_json, say_unless_quiet};
 use crate::analysis::{Capacitances, MacropixelPower};
 use crate::chip::{CellLibrary, Exposure, Mode, PCounter, SensorConfig};
 use crate::files::InputError;
@@ -129,7 +129,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         }
         let exposure = Exposure::new(&config, stop_periods, args.laser_cycles);
         let pulses = pulses(&config, &exposure, args.counts_hz);
-        let power = MacropixelPower::of(&config, &exposure, start, &pulses, &capacitances);
+        let power = MacropixelPower::simulate(&config, &exposure, start, &pulses, &capacitances);
         variants.push(Variant {
             p_counter: match config.p_counter_block {
                 Some(_) => "own block",
@@ -146,16 +146,16 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
     if args.json {
         return say_json(&variants);
     }
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "Switching energy of a macropixel in a laser cycle of {stop_periods} CLK periods at {} MHz, pJ (share)\n{}",
         config.clk_hz / 1e6,
         table(&variants, config.pixels())
     ))?;
-    if let Some(library) = CellLibrary::of(&config)
+    if let Some(library) = CellLibrary::from_config(&config)
         .ok()
         .and_then(CellLibrary::from_file)
     {
-        tell(format_args!(
+        say_unless_quiet(format_args!(
             "\nArea in the cells of {}, um2 (leakage, nW; energy of a laser cycle within cells + in what they drive, pJ)\n{}",
             library.liberty.name,
             silicon_table(&variants)

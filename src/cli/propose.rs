@@ -6,12 +6,13 @@ use std::time::Instant;
 use clap::Args;
 
 use super::SceneArgs;
-use super::voice::{notes, progress, tell};
+use super::voice::{notes, progress, say_unless_quiet};
 use crate::chip::{CellLibrary, Sensor, SensorConfig};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::numerics::intervals::Estimate;
 use crate::propose::{
-    Check, Confirmed, Found, Goal, NotFound, Own, Point, Problem, Space, Step, gates_agree, search,
+    Check, ConfirmedDesign, DesignPoint, Goal, NotFound, Own, Problem, SearchResult, SearchStep,
+    Space, gates_agree, search,
 };
 use crate::report::{Axis, Chart, Grid};
 
@@ -62,11 +63,11 @@ pub(super) struct ProposeArgs {
 /// A point of the front that stands for something, and what `cohort` says of it.
 struct Corner {
     name: &'static str,
-    point: Point,
+    point: DesignPoint,
     check: Check,
 }
 
-/// What corners have least of, in the order of [`Point::costs`].
+/// What corners have least of, in the order of [`DesignPoint::costs`].
 const CORNERS: [&str; 5] = [
     "least laser power",
     "smallest macropixel",
@@ -81,7 +82,7 @@ const CORNERS: [&str; 5] = [
 /// Bad input, a goal that no design reaches, unwritable output.
 pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
-    let (goal, space) = asked(args)?;
+    let (goal, space) = goal_and_space(args)?;
     let problem = Problem::new(goal, sensor, &scene)?;
     let results = ResultSet::begin(&args.out, "propose")?;
     let clocks = space.clk_hz.len() * space.thresholds.len();
@@ -91,8 +92,8 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     );
     let begin = Instant::now();
     let told = |step| match step {
-        Step::Clock => bar.inc(1),
-        Step::Check => {
+        SearchStep::Clock => bar.inc(1),
+        SearchStep::Check => {
             // How many there will be shows only as they are checked.
             bar.inc_length(1);
             bar.inc(1);
@@ -127,7 +128,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
         "seed": args.seed,
     });
     notes(results.commit(asked)?);
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "A target of reflectivity {} at {} m under {} klux, found with probability {} in {} frames a second, to {} m:\n\
          {} designs by theory, {} of them on the front and confirmed on cohort, in {took_s:.1} s; its corners are\n\n{}\n",
         goal.reflectivity,
@@ -140,9 +141,9 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
         found.front.len(),
         grid(&corners, &found, area),
     ))?;
-    tell(sentences(&problem, &found, &corners))?;
+    say_unless_quiet(sentences(&problem, &found, &corners))?;
     let (laser, design) = (1e2 * proposed.times_class_1, &proposed.design);
-    tell(format_args!(
+    say_unless_quiet(format_args!(
         "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows at {} frames a second.\n\
          One of its macropixels, simulated gate by gate, counts as the window engine in {cycles} laser cycles.\n\
          In {out}: designs.csv front.svg front.csv sensor.toml scene.toml {MANIFEST}\n\n  \
@@ -157,7 +158,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
 }
 
 /// What is asked for, and what is tried.
-fn asked(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
+fn goal_and_space(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
     let goal = Goal {
         range_m: args.range,
         reflectivity: args.reflectivity,
@@ -198,7 +199,7 @@ fn option_of(fault: &str) -> &'static str {
 
 /// In what areas are.
 fn area_unit(sensor: &SensorConfig) -> &'static str {
-    let library = CellLibrary::of(sensor).ok();
+    let library = CellLibrary::from_config(sensor).ok();
     match library.and_then(CellLibrary::from_file) {
         Some(_) => "um2",
         None => "transistors",
@@ -206,9 +207,9 @@ fn area_unit(sensor: &SensorConfig) -> &'static str {
 }
 
 /// The balanced design, then those with the least of something, each once.
-fn corners(found: &Found) -> Vec<Corner> {
-    let least = |cost: &dyn Fn(&Point) -> f64| -> Confirmed {
-        let order = |one: &Confirmed| (cost(&one.point), one.point.ln_cost());
+fn corners(found: &SearchResult) -> Vec<Corner> {
+    let least = |cost: &dyn Fn(&DesignPoint) -> f64| -> ConfirmedDesign {
+        let order = |one: &ConfirmedDesign| (cost(&one.point), one.point.ln_cost());
         let least = found.front.iter().copied().reduce(|best, next| {
             if order(&next) < order(&best) {
                 next
@@ -218,8 +219,8 @@ fn corners(found: &Found) -> Vec<Corner> {
         });
         least.expect("a front has a point")
     };
-    let named = |name, Confirmed { point, check }| Corner { name, point, check };
-    let mut chosen = vec![named("balanced", least(&Point::ln_cost))];
+    let named = |name, ConfirmedDesign { point, check }| Corner { name, point, check };
+    let mut chosen = vec![named("balanced", least(&DesignPoint::ln_cost))];
     for (at, name) in CORNERS.into_iter().enumerate() {
         let corner = named(name, least(&|point| point.costs()[at]));
         if !chosen.iter().any(|known| known.point == corner.point) {
@@ -230,7 +231,7 @@ fn corners(found: &Found) -> Vec<Corner> {
 }
 
 /// Columns of costs and design that the table and the CSV share.
-fn cells(point: &Point) -> [String; 12] {
+fn cells(point: &DesignPoint) -> [String; 12] {
     let design = &point.design;
     [
         format!("{:.3}", 1e3 * point.power_w),
@@ -259,19 +260,19 @@ fn headings(area: &str) -> Vec<String> {
 }
 
 /// A measurement beside its theory.
-fn beside(theory: f64, measured: &Estimate, decimals: usize) -> String {
+fn theory_and_measured(theory: f64, measured: &Estimate, decimals: usize) -> String {
     format!("{theory:.decimals$} / {:.decimals$}", measured.value)
 }
 
-fn grid(corners: &[Corner], found: &Found, area: &str) -> Grid {
+fn grid(corners: &[Corner], found: &SearchResult, area: &str) -> Grid {
     let checked = ["found, % (theory / cohort)", "sigma, m"].map(str::to_owned);
     let mut grid = Grid::new(headings(area).into_iter().chain(checked));
     for Corner { name, point, check } in corners {
         let own = [(*name).to_owned()].into_iter().chain(cells(point));
         let share = check.detection.map(|share| 100.0 * share);
         grid.push(own.chain([
-            beside(100.0 * point.detection, &share, 2),
-            beside(point.precision_m, &check.precision_m, 3),
+            theory_and_measured(100.0 * point.detection, &share, 2),
+            theory_and_measured(point.precision_m, &check.precision_m, 3),
         ]));
     }
     if let Some(point) = found.own.point() {
@@ -286,7 +287,7 @@ fn grid(corners: &[Corner], found: &Found, area: &str) -> Grid {
 }
 
 /// What to know beside the table: where theory and engine differ, and what becomes of the sensor as it is.
-fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
+fn sentences(problem: &Problem, found: &SearchResult, corners: &[Corner]) -> String {
     let mut text = String::new();
     for Corner { name, point, check } in corners.iter().filter(|c| !c.check.agrees(&c.point)) {
         let [share, sigma] = [check.detection.map(|s| 100.0 * s), check.precision_m];
@@ -304,7 +305,7 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
     }
     let sensor = problem.sensor();
     let usual = SensorConfig::default();
-    let of = |s: &SensorConfig| {
+    let design_values = |s: &SensorConfig| {
         (
             s.bins,
             s.bin_bits,
@@ -313,7 +314,7 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
             s.threshold,
         )
     };
-    let name = if of(sensor) == of(&usual) {
+    let name = if design_values(sensor) == design_values(&usual) {
         "The QuantIC4x4"
     } else {
         "The sensor itself"
@@ -323,7 +324,7 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
         Own::Impossible(limit) => format!("{name} cannot do it: {limit}.\n\n"),
         Own::Beaten(own, better) => {
             let best = &better[0];
-            let [mine, theirs] = [own, best].map(Point::costs);
+            let [mine, theirs] = [own, best].map(DesignPoint::costs);
             let what = [
                 "laser power",
                 "macropixel",
@@ -355,21 +356,21 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
 }
 
 /// All of the front and the sensor itself by their numbers, with what was measured of the front.
-fn write_designs(path: &Path, found: &Found, corners: &[Corner]) -> anyhow::Result<()> {
-    let numbers = |point: &Point| toml::Table::try_from(point);
+fn write_designs(path: &Path, found: &SearchResult, corners: &[Corner]) -> anyhow::Result<()> {
+    let numbers = |point: &DesignPoint| toml::Table::try_from(point);
     let keys = numbers(&found.front[0].point)?;
     let measured = "cohort_detection | cohort_detection_low | cohort_detection_high | cohort_precision_m | cohort_precision_low_m | cohort_precision_high_m";
     let headings = ["corner"]
         .into_iter()
         .chain(keys.keys().map(String::as_str));
     let mut grid = Grid::new(headings.chain(measured.split(" | ")));
-    let mut push = |name: &str, point: &Point, measured: [String; 6]| -> anyhow::Result<()> {
+    let mut push = |name: &str, point: &DesignPoint, measured: [String; 6]| -> anyhow::Result<()> {
         let numbers = numbers(point)?;
         let numbers = numbers.values().map(ToString::to_string);
         grid.push([name.to_owned()].into_iter().chain(numbers).chain(measured));
         Ok(())
     };
-    for Confirmed { point, check } in &found.front {
+    for ConfirmedDesign { point, check } in &found.front {
         let corner = corners.iter().find(|corner| corner.point == *point);
         let [a, b] = [check.detection, check.precision_m];
         let measured = [a.value, a.low, a.high, b.value, b.low, b.high].map(|x| x.to_string());
@@ -382,13 +383,13 @@ fn write_designs(path: &Path, found: &Found, corners: &[Corner]) -> anyhow::Resu
 }
 
 /// Laser power over area; how fast chips are by their marks.
-fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Chart {
+fn chart(problem: &Problem, found: &SearchResult, proposed: &DesignPoint, area: &str) -> Chart {
     let goal = problem.goal();
     let title = format!(
         "Designs for reflectivity {} at {} m, {} klux, {} frames/s that nothing beats",
         goal.reflectivity, goal.range_m, goal.illuminance_klux, goal.fps
     );
-    let at = |point: &Point| (point.area, 1e3 * point.power_w);
+    let area_and_power = |point: &DesignPoint| (point.area, 1e3 * point.power_w);
     let front = || found.front.iter().map(|one| &one.point);
     let powers = front().map(|point| point.power_w);
     let [least, most] = [f64::min, f64::max].map(|of| powers.clone().reduce(of).unwrap_or(1.0));
@@ -402,8 +403,8 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
     let ends = [1.0, 2.0, 5.0, f64::INFINITY];
     for pair in ends.windows(2) {
         let [from, to] = [pair[0] * goal.fps, pair[1] * goal.fps];
-        let within = |point: &&Point| (from..to).contains(&point.fps.max(goal.fps));
-        let points: Vec<(f64, f64)> = front().filter(within).map(at).collect();
+        let within = |point: &&DesignPoint| (from..to).contains(&point.fps.max(goal.fps));
+        let points: Vec<(f64, f64)> = front().filter(within).map(area_and_power).collect();
         let name = if to.is_finite() {
             format!("{from:.0} to {to:.0} frames/s")
         } else {
@@ -414,7 +415,7 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
         }
     }
     if let Some(point) = found.own.point() {
-        chart = chart.points("this sensor", [at(point)]);
+        chart = chart.points("this sensor", [area_and_power(point)]);
     }
-    chart.points("balanced: sensor.toml", [at(proposed)])
+    chart.points("balanced: sensor.toml", [area_and_power(proposed)])
 }

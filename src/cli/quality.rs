@@ -2,10 +2,10 @@
 
 use crate::ranging::DepthOptions;
 use crate::report::Table;
-use crate::system::Summary;
+use crate::system::FrameSummary;
 
 /// How good the depths are, and why macropixels have none.
-pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary) {
+pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &FrameSummary) {
     let metres = |value: Option<f64>| match value {
         Some(m) => format!("{m:.3} m"),
         None => "-".to_owned(),
@@ -14,7 +14,7 @@ pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary)
         Some(m) => format!("{:.1} mm", 1e3 * m),
         None => "-".to_owned(),
     };
-    let of = |part: usize, whole: usize| format!("{part} of {whole}");
+    let part_of_whole = |part: usize, whole: usize| format!("{part} of {whole}");
     let with_surface = summary.depths - summary.depths_without_surface;
     let is_corrected = options.correct_walk;
     table.push(
@@ -22,12 +22,12 @@ pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary)
             "depths of surfaces, false alarms {:e}",
             options.false_alarm_rate
         ),
-        of(with_surface, summary.with_target),
+        part_of_whole(with_surface, summary.with_target),
     );
     table.push("depths of nothing", summary.depths_without_surface);
     table.push(
         format!("outliers, beyond a bin of {:.2} m", summary.bin_m),
-        of(summary.outliers, with_surface),
+        part_of_whole(summary.outliers, with_surface),
     );
     table.push("RMS error of these depths", metres(summary.rms_error_m));
     table.push(

@@ -45,75 +45,83 @@ static DELAY_LINES: LazyLock<SensorConfig> = LazyLock::new(|| SensorConfig {
 /// A macropixel and its delays.
 static MACROPIXEL: LazyLock<(Netlist, Timing)> = LazyLock::new(|| {
     let netlist = Netlist::elaborate(&macropixel::circuit(&SENSOR));
-    let timing = Silicon::of(&SENSOR).timing(&netlist);
+    let timing = Silicon::new(&SENSOR).timing(&netlist);
     (netlist, timing)
 });
 
 /// The readers; the corpus of each is the folder of its name.
 pub const READERS: &[(&str, Reader)] = &[
     ("sensor", |path| {
-        said(SensorConfig::read_document(&document(path)?))
+        error_text(SensorConfig::read_document(&document(path)?))
     }),
-    ("scene", |path| said(Scene::read(&document(path)?))),
-    ("study", |path| said(Study::load(path))),
-    ("kept_study", |path| beside(path, "study.json", study_of)),
+    ("scene", |path| error_text(Scene::read(&document(path)?))),
+    ("study", |path| error_text(Study::load(path))),
+    ("kept_study", |path| {
+        read_in_folder(path, "study.json", study_of)
+    }),
     ("options", read_options),
-    ("starts", |path| said(read_starts(path, &SENSOR))),
+    ("starts", |path| error_text(read_starts(path, &SENSOR))),
     ("events", |path| {
         let exposure = Exposure::new(&SENSOR, 100, 10);
-        said(read_events(path, &SENSOR, &exposure))
+        error_text(read_events(path, &SENSOR, &exposure))
     }),
     ("curve", |path| {
         let (mut scene, csv) = (
-            Document::of("curve", Table::new()),
+            Document::from_table("curve", Table::new()),
             path.with_extension("csv"),
         );
         fs::copy(path, &csv).expect("a file of ours");
-        said(scene.assign(&format!("lidar.pulse={:?}", csv.display()), "--set"))?;
-        said(Scene::read(&scene))
+        error_text(scene.assign(&format!("lidar.pulse={:?}", csv.display()), "--set"))?;
+        error_text(Scene::read(&scene))
     }),
     ("sdf", |path| {
         let text = text(path)?;
         let sdf = Sdf::parse("SDF", &text).map_err(|e| e.to_string())?;
         let (netlist, timing) = &*MACROPIXEL;
         oddities(&sdf, SENSOR.corner);
-        said(annotate(&mut timing.clone(), netlist, &sdf, SENSOR.corner))
+        error_text(annotate(&mut timing.clone(), netlist, &sdf, SENSOR.corner))
     }),
-    ("liberty", |path| said(Liberty::read(&text(path)?, &[]))),
+    ("liberty", |path| {
+        error_text(Liberty::read(&text(path)?, &[]))
+    }),
     ("yosys", |path| {
         let module = Module::from_yosys(&text(path)?, None);
-        said(module.map(|module| Netlist::elaborate(&module)))
+        error_text(module.map(|module| Netlist::elaborate(&module)))
     }),
     ("block", |path| {
         let file = path.display().to_string().into();
         let table = Table::from_iter([("p_counter_block".to_owned(), file)]);
-        said(SensorConfig::read_document(&Document::of("block", table)))
+        error_text(SensorConfig::read_document(&Document::from_table(
+            "block", table,
+        )))
     }),
-    ("captures", |path| said(tmf8820::read(path))),
+    ("captures", |path| error_text(tmf8820::read(path))),
     ("zones", |path| {
-        said(parse_json::<Calibration>("zones", &text(path)?, "zones"))
+        error_text(parse_json::<Calibration>("zones", &text(path)?, "zones"))
     }),
     ("bin_profile", |path| {
-        said(read_calibration(path, &DELAY_LINES))
+        error_text(read_calibration(path, &DELAY_LINES))
     }),
-    ("pair", |path| said(calibration::read_calibration(path))),
+    ("pair", |path| {
+        error_text(calibration::read_calibration(path))
+    }),
     ("frame", |path| {
-        beside(path, "frame.json", |folder| {
+        read_in_folder(path, "frame.json", |folder| {
             let mut counts = Vec::new();
             write_npy(&mut counts, &[1, 1, 16], &[1u16; 16]).expect("it is in memory");
             fs::write(folder.join("histograms.npy"), counts).expect("a folder of ours");
-            Page::of(folder, folder, 1)
+            Page::read(folder, folder, 1)
         })
     }),
-    ("counts", |path| said(read_counts(path, &[1, 1, 16]))),
-    ("npy", |path| said(Raster::read(path))),
-    ("png", |path| said(Raster::read(path))),
-    ("pfm", |path| said(Raster::read(path))),
-    ("exr", |path| said(Raster::read(path))),
-    ("obj", |path| said(Mesh::read(path))),
+    ("counts", |path| error_text(read_counts(path, &[1, 1, 16]))),
+    ("npy", |path| error_text(Raster::read(path))),
+    ("png", |path| error_text(Raster::read(path))),
+    ("pfm", |path| error_text(Raster::read(path))),
+    ("exr", |path| error_text(Raster::read(path))),
+    ("obj", |path| error_text(Mesh::read(path))),
     ("journal", read_journal),
     ("manifest", |path| {
-        beside(path, MANIFEST, |folder| {
+        read_in_folder(path, MANIFEST, |folder| {
             let set = ResultSet::begin(folder, "frame")?;
             fs::write(set.staging().join("result"), "new").expect("a folder of ours");
             set.commit(())
@@ -121,7 +129,7 @@ pub const READERS: &[(&str, Reader)] = &[
     }),
 ];
 
-fn said<T, E: ToString>(read: Result<T, E>) -> Result<(), String> {
+fn error_text<T, E: ToString>(read: Result<T, E>) -> Result<(), String> {
     read.map(drop).map_err(|error| error.to_string())
 }
 
@@ -134,7 +142,7 @@ fn document(path: &Path) -> Result<Document, String> {
 }
 
 /// What reads a file by its folder reads it in one of its own.
-fn beside<T, E: ToString>(
+fn read_in_folder<T, E: ToString>(
     path: &Path,
     name: &str,
     read: impl FnOnce(&Path) -> Result<T, E>,
@@ -142,7 +150,7 @@ fn beside<T, E: ToString>(
     let folder = path.with_extension("folder");
     fs::create_dir_all(&folder).expect("a folder of ours");
     fs::copy(path, folder.join(name)).expect("a file of ours");
-    let read = said(read(&folder));
+    let read = error_text(read(&folder));
     fs::remove_dir_all(&folder).expect("a folder of ours");
     read
 }
@@ -150,22 +158,22 @@ fn beside<T, E: ToString>(
 /// Options as users write them, one a line: `guide=GUIDE`, `windows=POLICY`, `sensor.KEY=VALUE`, `scene.SECTION.KEY=VALUE`.
 fn read_options(path: &Path) -> Result<(), String> {
     let (mut sensor, mut scene) = (
-        Document::of("--set", Table::new()),
+        Document::from_table("--set", Table::new()),
         Scene::outdoor_document(),
     );
     for line in text(path)?.lines() {
         match line.split_once(['=', '.']) {
-            Some(("guide", guide)) => said(options::parse_all(guide.split(' '), "--guide"))?,
+            Some(("guide", guide)) => error_text(options::parse_all(guide.split(' '), "--guide"))?,
             Some(("windows", policy)) => {
-                said(WindowPolicy::default().with(policy, "--windows"))?;
+                error_text(WindowPolicy::default().with_changes(policy, "--windows"))?;
             }
-            Some(("sensor", assignment)) => said(sensor.assign(assignment, "--set"))?,
-            Some(("scene", assignment)) => said(scene.assign(assignment, "--set"))?,
+            Some(("sensor", assignment)) => error_text(sensor.assign(assignment, "--set"))?,
+            Some(("scene", assignment)) => error_text(scene.assign(assignment, "--set"))?,
             _ => return Err(format!("{line} is no option")),
         }
     }
-    said(SensorConfig::read_document(&sensor))?;
-    said(Scene::read(&scene))
+    error_text(SensorConfig::read_document(&sensor))?;
+    error_text(Scene::read(&scene))
 }
 
 /// Whole lines stay, whatever they are, and what is appended is read.
@@ -178,7 +186,7 @@ fn read_journal(path: &Path) -> Result<(), String> {
     let before = count().map_err(|error| error.to_string())?;
     let mut journal = Journal::open(path).map_err(|error| error.to_string())?;
     let journal = journal.as_mut().expect("nobody else has it");
-    said(journal.append(&journal_line("next")))?;
+    error_text(journal.append(&journal_line("next")))?;
     assert_eq!(count(), Ok((before.0 + 1, before.1)));
     Ok(())
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::asked::WaveFormatOption;
 use super::sdf::annotated_timing;
 use super::settings::SiliconArgs;
-use super::voice::{aside, note, progress, say_json};
+use super::voice::{note, progress, say_json, table_to_stderr};
 use crate::ORIGIN;
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{SensorConfig, Silicon};
@@ -102,7 +102,7 @@ impl From<Checks> for Policy {
 pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let format = match &args.out {
         None => Format::Csv,
-        Some(path) => Format::of(path)?,
+        Some(path) => Format::from_path(path)?,
     };
     let file = |path: &Option<PathBuf>| Some(format!(" {}", path.as_ref()?.display()));
     for (option, given, what) in [
@@ -132,8 +132,8 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let silicon = args.silicon.read(&stimuli.sensor)?;
     // Delays of a file are the gates' to judge, and mismatched macropixels each their own (`gdtof timing --mismatch`).
     let timing = (args.sdf.is_none() && silicon.mismatch.is_none())
-        .then(|| TimingVerdict::of(&stimuli.sensor, &silicon, (0, 0)).report());
-    let silicon = (silicon != Silicon::of(&stimuli.sensor)).then_some(silicon);
+        .then(|| TimingVerdict::analyse(&stimuli.sensor, &silicon, (0, 0)).report());
+    let silicon = (silicon != Silicon::new(&stimuli.sensor)).then_some(silicon);
     if silicon.is_some() && args.sdf.is_some() {
         let message = "takes delays and limits from elsewhere; leave out either --sdf or process, voltage, temperature and mismatch";
         return Err(InputError::new("--sdf", message).into());
@@ -159,7 +159,7 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         timing,
         time_keeping: replayed.coverage,
     };
-    summary.tell(&stimuli.sensor);
+    summary.print_losses(&stimuli.sensor);
     let out = args.out.as_deref();
     write(&stimuli.sensor, &replayed.histograms, out, format)?;
     if args.json {
@@ -169,7 +169,7 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
 }
 
 /// Histograms of the array, and what else a replay finds.
-struct Replayed {
+struct ReplayResult {
     histograms: Histograms,
     cancelled: u64,
     coverage: Option<ClosedFormCoverage>,
@@ -189,9 +189,9 @@ struct Summary {
 
 impl Summary {
     /// Says on standard error what the chip loses silently.
-    fn tell(&self, config: &SensorConfig) {
+    fn print_losses(&self, config: &SensorConfig) {
         if let Some(coverage) = &self.time_keeping {
-            aside(table(coverage));
+            table_to_stderr(table(coverage));
         }
         let unmet = self.timing.as_ref().filter(|timing| !timing.met);
         if let (Some(timing), true) = (unmet, self.engine != EngineKind::Gate) {
@@ -217,7 +217,7 @@ fn replay_array(
     stimuli: &Stimuli,
     args: &ReplayArgs,
     silicon: Option<Silicon>,
-) -> anyhow::Result<Replayed> {
+) -> anyhow::Result<ReplayResult> {
     let sensor = match silicon {
         Some(silicon) => &stimuli.sensor.made_of(&silicon),
         None => &stimuli.sensor,
@@ -251,7 +251,7 @@ fn replay_array(
                 checks: checks.report(simulation.netlist()),
                 events: &events.report,
             };
-            aside(format_args!("{}{}", report.checks, report.events));
+            table_to_stderr(format_args!("{}{}", report.checks, report.events));
             // Before the histograms, which unknown states may have spoilt: this says why.
             if let Some(path) = &args.checks_json {
                 OutputFile::write_with(path, |w| Ok(serde_json::to_writer_pretty(w, &report)?))?;
@@ -269,7 +269,7 @@ fn replay_array(
         }
         None => cancelled(&Gate::new(sensor, exposure), sensor, &pixels),
     };
-    Ok(Replayed {
+    Ok(ReplayResult {
         histograms: simulation.histograms()?,
         cancelled,
         coverage: None,
@@ -299,7 +299,7 @@ fn watch(
     record(simulation, stimuli, args, &mut (&mut activity, observer))?;
     let end = simulation.now();
     OutputFile::write_with(saif, |out| {
-        let nets = activity.until(end);
+        let nets = activity.net_activity(end);
         write_saif(out, &netlist, &nets, end, args.saif_glitches, ORIGIN)
     })
 }
@@ -326,7 +326,7 @@ fn record(
     let view = View::of_array(pixels.collect(), sensor, exposure, start);
     let format = args
         .wave_format
-        .map_or(WaveFormat::of(waves), WaveFormat::from);
+        .map_or(WaveFormat::from_path(waves), WaveFormat::from);
     waveform::record(simulation, waves, format, &view, observer)
 }
 
@@ -349,7 +349,7 @@ fn replay(
     stimuli: &Stimuli,
     kind: EngineKind,
     silicon: Option<&Silicon>,
-) -> anyhow::Result<Replayed> {
+) -> anyhow::Result<ReplayResult> {
     let Stimuli {
         sensor, exposure, ..
     } = stimuli;
@@ -364,13 +364,13 @@ fn replay(
     };
     let timed = Timed::new(sensor.made_of(silicon), exposure, runner);
     let replayed = run_engine(stimuli, &timed)?;
-    Ok(Replayed {
+    Ok(ReplayResult {
         coverage: (runner != Runner::Gate).then(|| timed.coverage()),
         ..replayed
     })
 }
 
-fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<Replayed> {
+fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<ReplayResult> {
     let template = "replaying {bar:40} {pos}/{len} macropixels";
     let progress = progress(stimuli.starts.len() as u64, template);
     let pulses = stimuli.pulses();
@@ -384,7 +384,7 @@ fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<Replayed
         })
         .collect();
     progress.finish_and_clear();
-    Ok(Replayed {
+    Ok(ReplayResult {
         histograms: Histograms::joined(engine.bins(), batches?),
         cancelled: cancelled(engine, &stimuli.sensor, &pixels),
         coverage: None,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::voice::{announce, busy, notes, progress, say_json, tell};
+use super::voice::{announce, busy, notes, progress, say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, ResultSet};
 use crate::reproduce::{self, Report, Selection};
 
@@ -56,7 +56,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
             OutputFile::write_with(&path, |out| table.write_csv(out))?;
             notes(set.commit(&args.liberty)?);
         }
-        return Ok(tell(table)?);
+        return Ok(say_unless_quiet(table)?);
     }
     let chosen = Selection {
         claims: args.claim.clone(),
@@ -119,7 +119,7 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
 fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
     for result in &report.claims {
         let claim = &result.claim;
-        tell(format_args!(
+        say_unless_quiet(format_args!(
             "Claim {}: {} ({}): {}\n{}",
             claim.number,
             claim.title,
@@ -128,47 +128,47 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
             reproduce::grid(&result.rows)
         ))?;
         for row in result.rows.iter().filter(|row| !row.notes().is_empty()) {
-            tell(format_args!("  {}: {}\n", row.what, row.notes()))?;
+            say_unless_quiet(format_args!("  {}: {}\n", row.what, row.notes()))?;
         }
-        tell("\n")?;
+        say_unless_quiet("\n")?;
     }
     for table in &report.tables {
-        tell(format_args!(
+        say_unless_quiet(format_args!(
             "Table {}: {}\n{}\n",
             table.number, table.title, table.it
         ))?;
     }
     for figure in &report.figures {
-        tell(format_args!("Fig. {}: {}\n", figure.number, figure.title))?;
+        say_unless_quiet(format_args!("Fig. {}: {}\n", figure.number, figure.title))?;
         if folder.is_none() {
-            tell("  give --out DIR for the picture and its numbers\n")?;
+            say_unless_quiet("  give --out DIR for the picture and its numbers\n")?;
         }
     }
     for result in &report.measurements {
-        tell(format_args!("{}\n", reproduce::heading(result)))?;
+        say_unless_quiet(format_args!("{}\n", reproduce::heading(result)))?;
         for note in &result.it.notes {
-            tell(format_args!("  {note}\n"))?;
+            say_unless_quiet(format_args!("  {note}\n"))?;
         }
         for (_, title, grid) in result.tables() {
-            tell(format_args!("\n{title}\n{grid}"))?;
+            say_unless_quiet(format_args!("\n{title}\n{grid}"))?;
         }
-        tell("\n")?;
+        say_unless_quiet("\n")?;
     }
     if !report.slips.is_empty() {
-        tell(format_args!("{}\n", reproduce::SLIPS_TITLE))?;
+        say_unless_quiet(format_args!("{}\n", reproduce::SLIPS_TITLE))?;
         for slip in &report.slips {
-            tell(format_args!(
+            say_unless_quiet(format_args!(
                 "  {}: {}; but {}. Model: {}.\n",
                 slip.place, slip.printed, slip.against, slip.model
             ))?;
         }
-        tell("\n")?;
+        say_unless_quiet("\n")?;
     }
     if !report.claims.is_empty() {
-        tell(format_args!("{}\n", reproduce::tally(report)))?;
+        say_unless_quiet(format_args!("{}\n", reproduce::tally(report)))?;
     }
     if let Some(folder) = folder {
-        tell(format_args!(
+        say_unless_quiet(format_args!(
             "page: {}\n",
             folder.join("report.html").display()
         ))?;

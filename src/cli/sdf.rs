@@ -7,14 +7,14 @@ use clap::{Args, ValueEnum};
 use indicatif::DecimalBytes;
 
 use super::SensorArgs;
-use super::voice::{note, progress, tell};
+use super::voice::{note, progress, say_unless_quiet};
 use crate::ORIGIN;
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::{Corner, Netlist, Timing};
 use crate::sdf::{
-    Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities,
-    write_library_sdf, write_sdf,
+    Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, SkippedEntry, annotate,
+    oddities, write_library_sdf, write_sdf,
 };
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -97,7 +97,7 @@ pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
         Ok(())
     })?;
     progress.finish_and_clear();
-    tell(format_args!("{cells} cells in {}\n", args.out.display()))?;
+    say_unless_quiet(format_args!("{cells} cells in {}\n", args.out.display()))?;
     Ok(())
 }
 
@@ -110,7 +110,7 @@ fn write_library(
     options: SdfOptions,
 ) -> std::io::Result<usize> {
     let top = array::circuit(config);
-    let silicon = Silicon::of(config);
+    let silicon = Silicon::new(config);
     if silicon.cell_library.from_file().is_some() {
         let netlist = Netlist::elaborate(&top.renamed(design));
         let timing = silicon.timing(&netlist);
@@ -145,7 +145,7 @@ pub(super) fn annotated_timing(
 ) -> Result<Timing, InputError> {
     let text = read_text(path)?;
     let sdf = Sdf::parse(&path.display().to_string(), &text)?;
-    let mut timing = Silicon::of(config).timing(netlist);
+    let mut timing = Silicon::new(config).timing(netlist);
     let result = annotate(&mut timing, netlist, &sdf, config.corner)?;
     if result.is_empty() {
         return Err(InputError::new(
@@ -156,14 +156,14 @@ pub(super) fn annotated_timing(
     for oddity in oddities(&sdf, config.corner) {
         note(format_args!("{}:{}: {oddity}", sdf.source, oddity.line()));
     }
-    let at = |skipped: &Skipped| {
+    let skipped_line = |skipped: &SkippedEntry| {
         format!(
             "{}:{}: left out or approximated {} of: {}",
             sdf.source, skipped.first_line, skipped.count, skipped.what
         )
     };
     for skipped in sdf.skipped.iter().chain(&result.notes) {
-        note(at(skipped));
+        note(skipped_line(skipped));
     }
     if result.longest_wire_to_d_fs > 0 {
         note(format_args!(
@@ -192,7 +192,7 @@ pub(super) fn annotated_timing(
 
 /// Why nothing of a file was taken over, and what to do.
 fn why_unused(sdf: &Sdf<'_>, corner: Corner, result: &Annotation) -> String {
-    let left_out = |skipped: &[Skipped]| {
+    let left_out = |skipped: &[SkippedEntry]| {
         let names: Vec<&str> = skipped.iter().map(|skipped| skipped.what).collect();
         names.join(", ")
     };

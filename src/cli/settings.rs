@@ -90,7 +90,7 @@ impl SensorArgs {
     ///
     /// # Errors
     /// As [`SensorArgs::read`].
-    pub(super) fn given(&self) -> Result<Option<Sensor>, InputError> {
+    pub(super) fn read_if_given(&self) -> Result<Option<Sensor>, InputError> {
         let has_file = self.sensor.is_some() || !self.liberty.is_empty();
         let has_size = self.rows.is_some() || self.cols.is_some();
         let is_given = has_file || has_size || !self.block.is_empty() || !self.set.is_empty();
@@ -106,7 +106,7 @@ impl SensorArgs {
 
     /// Notes what is odd about the cell library, and if CLK is faster than the thesis's chip takes.
     fn warn_of_unusual(&self, sensor: &SensorConfig) {
-        let library = CellLibrary::of(sensor).ok();
+        let library = CellLibrary::from_config(sensor).ok();
         if let Some(library) = library.and_then(CellLibrary::from_file) {
             library.liberty.map.odd.iter().for_each(note);
         }
@@ -249,7 +249,7 @@ impl SiliconArgs {
     /// # Errors
     /// Conditions and mismatch for which no delays are known.
     pub(super) fn read(&self, config: &SensorConfig) -> Result<Silicon, InputError> {
-        let silicon = Silicon::of(config).in_conditions(self.conditions(config));
+        let silicon = Silicon::new(config).in_conditions(self.conditions(config));
         let silicon = silicon.map_err(|why| {
             let options = match why {
                 UnknownConditions::OfLibrary => "--process, --voltage, --temperature",

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Command, ValueEnum};
 use clap_complete::Shell;
 
-use super::voice::{notes, say_file, tell};
+use super::voice::{notes, say_file, say_unless_quiet};
 use crate::chip::SensorConfig;
 use crate::files::{OutputFile, ResultSet};
 use crate::scene::Scene;
@@ -81,7 +81,7 @@ pub(super) fn man(args: &ManArgs, command: Command) -> anyhow::Result<()> {
     }
     notes(set.commit(())?);
     let (folder, many) = (args.out.display(), pages.len());
-    Ok(tell(format_args!(
+    Ok(say_unless_quiet(format_args!(
         "{many} pages in {folder}: man -l {folder}/gdtof.1\n"
     ))?)
 }

@@ -15,7 +15,7 @@ use clap::Args;
 use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 
-use super::voice::{progress, say_file, say_json, tell};
+use super::voice::{progress, say_file, say_json, say_unless_quiet};
 use crate::engine::{Cohort, CohortOptions, Cycle, Expose, Replay, Window};
 use crate::files::{InputError, read_text};
 use crate::photon::SpadEvent;
@@ -38,7 +38,7 @@ const ONE_WORD: (usize, usize) = (16, 32);
 /// What is run between the two readings of the clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-enum Work {
+enum TimedWork {
     /// The cycle engine's logic on packed pulses.
     CycleLogic,
     /// The same, control simulated in every laser cycle.
@@ -55,31 +55,31 @@ enum Work {
     Cohort,
 }
 
-impl Work {
+impl TimedWork {
     /// Its name, and what of an exposure is not done between the readings of the clock.
     fn texts(self) -> [&'static str; 2] {
         match self {
-            Work::CycleLogic => [
+            TimedWork::CycleLogic => [
                 "cycle, logic",
                 "photons, packing, control after the recorded cycle",
             ],
-            Work::CycleLiveLogic => ["cycle, logic with live control", "photons, packing"],
-            Work::CyclePacking => [
+            TimedWork::CycleLiveLogic => ["cycle, logic with live control", "photons, packing"],
+            TimedWork::CyclePacking => [
                 "cycle, packing and logic",
                 "photons, control after the recorded cycle",
             ],
-            Work::CycleWhole => ["cycle, all", "control after the recorded cycle"],
-            Work::WindowPulses => [
+            TimedWork::CycleWhole => ["cycle, all", "control after the recorded cycle"],
+            TimedWork::WindowPulses => [
                 "window, recorded pulses",
                 "photons, CLK periods outside windows",
             ],
-            Work::WindowWhole => ["window, all", "CLK periods, and photons, outside windows"],
-            Work::Cohort => ["cohort, all", "photons, CLK periods"],
+            TimedWork::WindowWhole => ["window, all", "CLK periods, and photons, outside windows"],
+            TimedWork::Cohort => ["cohort, all", "photons, CLK periods"],
         }
     }
 
     fn is_cycle(self) -> bool {
-        use Work::{Cohort, WindowPulses, WindowWhole};
+        use TimedWork::{Cohort, WindowPulses, WindowWhole};
         !matches!(self, WindowPulses | WindowWhole | Cohort)
     }
 }
@@ -87,7 +87,7 @@ impl Work {
 /// What a figure is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 struct Subject {
-    work: Work,
+    work: TimedWork,
     case: SpeedCase,
     rows: usize,
     cols: usize,
@@ -95,7 +95,7 @@ struct Subject {
 }
 
 impl Subject {
-    fn new(work: Work, case: SpeedCase, (rows, cols): (usize, usize), threads: usize) -> Self {
+    fn new(work: TimedWork, case: SpeedCase, (rows, cols): (usize, usize), threads: usize) -> Self {
         Subject {
             work,
             case,
@@ -158,7 +158,7 @@ struct Spread {
 }
 
 impl Spread {
-    fn of(mut times_s: Vec<f64>) -> Self {
+    fn from_times(mut times_s: Vec<f64>) -> Self {
         times_s.sort_by(f64::total_cmp);
         Spread {
             least_s: times_s[0],
@@ -222,7 +222,7 @@ pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     if args.json {
         say_json(&figures)?;
     } else {
-        tell(table(&figures))?;
+        say_unless_quiet(table(&figures))?;
     }
     Ok(())
 }
@@ -230,7 +230,7 @@ pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
 /// The engines on one frame, by what is left out and by threads; the worst cases on one thread; then growth with the array
 /// at `threads`.
 fn plan(largest: usize, threads: usize) -> Vec<Subject> {
-    use Work::*;
+    use TimedWork::*;
     let array = (ARRAY.0.min(largest), ARRAY.1.min(largest));
     let one_word = (ONE_WORD.0.min(largest), ONE_WORD.1.min(largest));
     let mut plan = Vec::new();
@@ -311,31 +311,35 @@ fn measure(subject: Subject, runs: u16) -> anyhow::Result<Figure> {
     })
 }
 
-fn times(frame: &SpeedFrame, work: Work, runs: u16) -> anyhow::Result<(Spread, Spread)> {
+fn times(frame: &SpeedFrame, work: TimedWork, runs: u16) -> anyhow::Result<(Spread, Spread)> {
     let (sensor, exposure) = (&frame.sensor, &frame.exposure);
     let cycle = || Cycle::new(sensor, exposure);
     let window = Window::new(sensor, exposure);
     let on_light = |engine: &dyn Expose| timed(runs, || frame.expose(engine));
     match work {
-        Work::CycleWhole => return on_light(&cycle()),
-        Work::WindowWhole => return on_light(&window),
-        Work::Cohort => return on_light(&Cohort::new(sensor, exposure, CohortOptions::default())),
+        TimedWork::CycleWhole => return on_light(&cycle()),
+        TimedWork::WindowWhole => return on_light(&window),
+        TimedWork::Cohort => {
+            return on_light(&Cohort::new(sensor, exposure, CohortOptions::default()));
+        }
         _ => (),
     }
     let (starts, photons) = (frame.starts(), frame.pulses());
     let pulses: Vec<&[SpadEvent]> = photons.iter().map(Vec::as_slice).collect();
-    if work == Work::WindowPulses {
+    if work == TimedWork::WindowPulses {
         return timed(runs, || window.histograms(&starts, &pulses));
     }
     let engine = match work {
-        Work::CycleLiveLogic => cycle().with_live_control(),
+        TimedWork::CycleLiveLogic => cycle().with_live_control(),
         _ => cycle(),
     };
-    if work == Work::CyclePacking {
-        return timed(runs, || engine.run(&starts, &engine.pack(&starts, &pulses)));
+    if work == TimedWork::CyclePacking {
+        return timed(runs, || {
+            engine.replay_packed(&starts, &engine.pack(&starts, &pulses))
+        });
     }
     let packed = engine.pack(&starts, &pulses);
-    timed(runs, || engine.run(&starts, &packed))
+    timed(runs, || engine.replay_packed(&starts, &packed))
 }
 
 /// Wall-clock and processor times of `runs` runs after one that is not counted.
@@ -351,7 +355,7 @@ fn timed<T, E: std::error::Error + Send + Sync + 'static>(
         processor_s.push(processor.elapsed().as_secs_f64());
         wall_s.push(wall.elapsed().as_secs_f64());
     }
-    Ok((Spread::of(wall_s), Spread::of(processor_s)))
+    Ok((Spread::from_times(wall_s), Spread::from_times(processor_s)))
 }
 
 /// Largest resident memory of this process, KiB, where /proc tells.

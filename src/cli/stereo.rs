@@ -7,9 +7,9 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
-use super::voice::{notes, say_json, tell};
+use super::voice::{notes, say_json, say_unless_quiet};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
-use crate::report::{Cell, DepthMap, Table, write_npy_f32};
+use crate::report::{DepthImage, ImageCell, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
 
 /// Arguments of `gdtof stereo`.
@@ -186,7 +186,7 @@ pub(super) struct Errors {
 }
 
 impl Errors {
-    pub(super) fn of(map: &DisparityMap, truth: &[f32]) -> Self {
+    pub(super) fn new(map: &DisparityMap, truth: &[f32]) -> Self {
         let known = || {
             truth
                 .iter()
@@ -273,7 +273,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         matched: map.matched(),
         run_time_s: [times_s[0], times_s[times_s.len() / 2]],
         threads: rayon::current_num_threads(),
-        errors: truth.map(|truth| Errors::of(&map, &truth)),
+        errors: truth.map(|truth| Errors::new(&map, &truth)),
     };
     let set = ResultSet::begin(&args.out, "stereo")?;
     let shape = [map.height(), map.width()];
@@ -291,7 +291,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
     if args.json {
         say_json(&report)?
     } else {
-        tell(table(args, &report))?
+        say_unless_quiet(table(args, &report))?
     }
     Ok(())
 }
@@ -334,12 +334,12 @@ pub(super) fn disparity_picture(
     map: &DisparityMap,
     path: &Path,
 ) -> Result<(), InputError> {
-    let cells: Vec<Cell> = (map.values_px().iter())
+    let cells: Vec<ImageCell> = (map.values_px().iter())
         .map(|&d| {
             if d.is_nan() {
-                Cell::Category(0)
+                ImageCell::Category(0)
             } else {
-                Cell::Depth(d)
+                ImageCell::Depth(d)
             }
         })
         .collect();
@@ -347,7 +347,7 @@ pub(super) fn disparity_picture(
     let least = known().fold(f32::INFINITY, f32::min).floor();
     let most = known().fold(f32::NEG_INFINITY, f32::max).ceil();
     let first = matcher.min_disparity as f32;
-    let picture = DepthMap {
+    let picture = DepthImage {
         title: "Disparity",
         cols: map.width(),
         cells: &cells,

@@ -6,12 +6,12 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::voice::{counted, note, notes, progress, tell};
+use super::voice::{note, notes, progress, quantity, say_unless_quiet};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
-    Cell, Drawing, Kind, Outcome, Plot, Results, Shard, Study, SweepError, columns, run as take,
-    study_of,
+    Drawing, Outcome, Plot, Results, Shard, Study, StudyKind, SweepError, TableCell, columns,
+    run as take, study_of,
 };
 
 /// Arguments of `gdtof sweep`.
@@ -94,7 +94,7 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
     if outcome.spoilt_lines > 0 {
         note(format_args!(
             "damaged in the journal: {}; their points were taken anew",
-            counted(outcome.spoilt_lines, "line")
+            quantity(outcome.spoilt_lines, "line")
         ));
     }
     let mut table = outcome_table(&study, &outcome, seconds);
@@ -110,13 +110,13 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
             Ok(())
         })?;
         table.push("in", folder.display());
-        tell(table)?;
+        say_unless_quiet(table)?;
         written.complain(&study)?;
     } else {
-        tell(table)?;
-        tell(format_args!(
+        say_unless_quiet(table)?;
+        say_unless_quiet(format_args!(
             "\nThis is one of {} parts; when all are done: gdtof sweep merge {}\n",
-            shard.of,
+            shard.parts,
             folder.display()
         ))?;
     }
@@ -152,7 +152,7 @@ fn run_merge(args: &MergeArgs) -> anyhow::Result<()> {
         table.push("points that are missing", written.missing);
     }
     table.push("in", out.display());
-    tell(table)?;
+    say_unless_quiet(table)?;
     Ok(written.complain(&study)?)
 }
 
@@ -208,15 +208,17 @@ fn write(
         .iter()
         .map(|plot| Drawing::new(plot, study, &columns, "--plot"));
     let mut drawings: Vec<Drawing<'_>> = drawings.collect::<Result<_, _>>()?;
-    let results = Results::of(study, folders)?;
+    let results = Results::read(study, folders)?;
     let (mut fault, mut has_result) = (None, false);
     let missing = results.write(set.staging(), |cells| {
         match cells.last() {
             // The last column says why there is no result.
-            Some(Cell::Word(why)) => drop(fault.get_or_insert_with(|| why.clone())),
+            Some(TableCell::Word(why)) => drop(fault.get_or_insert_with(|| why.clone())),
             _ => has_result = true,
         }
-        drawings.iter_mut().for_each(|drawing| drawing.see(cells));
+        drawings
+            .iter_mut()
+            .for_each(|drawing| drawing.add_row(cells));
     });
     let missing = missing.map_err(plain)?;
     check(missing)?;
@@ -264,8 +266,8 @@ fn outcome_table(study: &Study, outcome: &Outcome, seconds: f64) -> Table {
     if outcome.taken > 0 {
         table.push("run time", format!("{seconds:.1} s"));
         let each = match study.kind {
-            Kind::Frame => format!("{:.1} /s", outcome.taken as f64 / seconds),
-            Kind::Theory => format!("{:.0} /s", outcome.taken as f64 / seconds),
+            StudyKind::Frame => format!("{:.1} /s", outcome.taken as f64 / seconds),
+            StudyKind::Theory => format!("{:.0} /s", outcome.taken as f64 / seconds),
         };
         table.push("points taken", each);
     }
@@ -278,9 +280,10 @@ fn shard(text: &str) -> Result<Shard, String> {
         Some((number(part)?, number(of)?))
     });
     match numbers {
-        Some((part, of)) if (1..=of).contains(&part) && of <= 1_000_000 => {
-            Ok(Shard { part: part - 1, of })
-        }
+        Some((part, of)) if (1..=of).contains(&part) && of <= 1_000_000 => Ok(Shard {
+            part: part - 1,
+            parts: of,
+        }),
         _ => Err(
             "is not a part of a study; give a part and the number of parts, such as 3/16"
                 .to_owned(),

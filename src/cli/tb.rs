@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::SensorArgs;
 use super::asked::WaveFormatOption;
-use super::voice::{complain, note, notes, progress, say_json, tell};
+use super::voice::{complain, note, notes, progress, say_json, say_unless_quiet};
 use crate::chip::SensorConfig;
 use crate::files::{InputError, ResultSet, clean_up_when_interrupted, instead_of};
 use crate::report::{Checks, Grid};
@@ -86,7 +86,7 @@ struct RunResult {
 /// # Errors
 /// Unknown names and files that cannot be written.
 pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
-    let sensor = args.sensor.given()?;
+    let sensor = args.sensor.read_if_given()?;
     let sensor = sensor.as_deref();
     let testbenches = chosen(&args.names, sensor)?;
     let entries = if args.list {
@@ -104,13 +104,13 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
                 continue;
             };
             if args.verbose || !result.passed {
-                tell(format_args!("{}\n{}\n", entry.name, result.checks))?;
+                say_unless_quiet(format_args!("{}\n{}\n", entry.name, result.checks))?;
             }
         }
-        tell(table(&entries))?;
+        say_unless_quiet(table(&entries))?;
         if let Some(first) = results().next() {
             let view = first.waveform.with_extension("gtkw");
-            tell(format_args!(
+            say_unless_quiet(format_args!(
                 "waveforms: gtkwave {}, for example\n",
                 view.display()
             ))?;
@@ -200,7 +200,7 @@ fn run_one(
     let checks = testbench.run(sensor, &set.staging().join(&file))?;
     Ok(RunResult {
         passed: checks.passed(),
-        checked: checks.made(),
+        checked: checks.count(),
         failed: checks.failed(),
         run_time_s: begin.elapsed().as_secs_f64(),
         waveform: waves.out.join(file),
@@ -257,7 +257,7 @@ pub fn testbench(name: &'static str) -> ExitCode {
             let view = result.waveform.with_extension("gtkw");
             let text = format!("{}waveform: gtkwave {}\n", result.checks, view.display());
             // A reader that has gone away changes no verdict.
-            let _ = tell(text);
+            let _ = say_unless_quiet(text);
             if result.passed {
                 ExitCode::SUCCESS
             } else {

@@ -4,8 +4,8 @@
 //! |---|---|---|
 //! | [`complain`] | standard error | yes |
 //! | [`say_json`], [`say_file`]: what a program or a file takes | standard output | yes |
-//! | [`tell`]: tables and sentences about what was done | standard output | no |
-//! | [`note`], [`announce`], [`aside`] | standard error | no |
+//! | [`say_unless_quiet`]: tables and sentences about what was done | standard output | no |
+//! | [`note`], [`announce`], [`table_to_stderr`] | standard error | no |
 //! | [`progress`], [`busy`] | standard error, if it is a terminal | no |
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -64,7 +64,7 @@ pub(super) fn say_json(data: &(impl Serialize + ?Sized)) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// Those of standard output.
-pub(super) fn tell(text: impl Display) -> std::io::Result<()> {
+pub(super) fn say_unless_quiet(text: impl Display) -> std::io::Result<()> {
     if is_quiet() {
         return Ok(());
     }
@@ -101,7 +101,7 @@ pub(super) fn announce(what: &str, seconds: f64) {
         } else {
             format!("{:.0} minutes", seconds / 60.0)
         };
-        let threads = counted(rayon::current_num_threads() as u64, "thread");
+        let threads = quantity(rayon::current_num_threads() as u64, "thread");
         note(format_args!("{what} takes about {time} on {threads}"));
     }
 }
@@ -112,7 +112,7 @@ pub(super) fn notes(sentences: Vec<String>) {
 }
 
 /// A table on standard error, where standard output has data.
-pub(super) fn aside(text: impl Display) {
+pub(super) fn table_to_stderr(text: impl Display) {
     if !is_quiet() {
         to_standard_error(text);
     }
@@ -120,18 +120,18 @@ pub(super) fn aside(text: impl Display) {
 
 /// A bar of `length` steps, in a template of `indicatif`. It goes when it is dropped.
 pub(super) fn progress(length: u64, template: &str) -> ProgressBar {
-    shown(ProgressBar::new(length), template)
+    styled_bar(ProgressBar::new(length), template)
 }
 
 /// What is being done where nobody knows how far it is, and for how long already. It goes when it is dropped.
 pub(super) fn busy(what: &str) -> ProgressBar {
-    shown(
+    styled_bar(
         ProgressBar::new_spinner(),
         &format!("{what} {{spinner}} {{elapsed}}"),
     )
 }
 
-fn shown(bar: ProgressBar, template: &str) -> ProgressBar {
+fn styled_bar(bar: ProgressBar, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template).expect("a template that indicatif knows");
     let bar = bar.with_style(style).with_finish(ProgressFinish::AndClear);
     if is_quiet() {
@@ -142,7 +142,7 @@ fn shown(bar: ProgressBar, template: &str) -> ProgressBar {
 }
 
 /// `1 line`, `3 lines`.
-pub(super) fn counted(number: u64, noun: &str) -> String {
+pub(super) fn quantity(number: u64, noun: &str) -> String {
     let s = if number == 1 { "" } else { "s" };
     format!("{number} {noun}{s}")
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::asked;
-use super::voice::{note, say_json, tell};
+use super::voice::{note, say_json, say_unless_quiet};
 use crate::engine::late_cycle;
 use crate::engine::waveform::{self, View};
 use crate::files::InputError;
@@ -79,7 +79,7 @@ pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
     let mut simulation = late_cycle(sensor, exposure, at, start, pulses, args.cycle);
     let origin = simulation.schedule().origin;
     let view = View::of_cycle(at, sensor, exposure, start, args.cycle);
-    let format = WaveFormat::of(&waves);
+    let format = WaveFormat::from_path(&waves);
     waveform::record(&mut simulation, &waves, format, &view, &mut ())?;
 
     let (from, to) = (
@@ -121,5 +121,8 @@ pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
         format!("{} to {}", origin + from, origin + to),
     );
     let view = report.waveform.with_extension("gtkw");
-    Ok(tell(format_args!("{table}gtkwave {}\n", view.display()))?)
+    Ok(say_unless_quiet(format_args!(
+        "{table}gtkwave {}\n",
+        view.display()
+    ))?)
 }

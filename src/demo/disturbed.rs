@@ -48,7 +48,7 @@ pub(crate) struct Disturbance {
 
 /// What one scheme makes of one case.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub(crate) struct Outcome {
+pub(crate) struct DisturbanceOutcome {
     pub(crate) case: String,
     pub(crate) scheme: &'static str,
     /// Bins of memory that a macropixel needs.
@@ -145,7 +145,7 @@ impl Disturbance {
         demonstrator: &Demonstrator,
         seed: u64,
         done: impl Fn() + Sync,
-    ) -> Result<Vec<Outcome>, FrameError> {
+    ) -> Result<Vec<DisturbanceOutcome>, FrameError> {
         let cases = self.cases.iter();
         let of_cases: Result<Vec<_>, _> = cases
             .map(|(case, world)| self.of_case(demonstrator, case, world, seed, &done))
@@ -160,7 +160,7 @@ impl Disturbance {
         world: &Scene,
         seed: u64,
         done: &(impl Fn() + Sync),
-    ) -> Result<Vec<Outcome>, FrameError> {
+    ) -> Result<Vec<DisturbanceOutcome>, FrameError> {
         let (rows, cols) = (
             demonstrator.sensor.rows as u32,
             demonstrator.sensor.cols as u32,
@@ -204,7 +204,7 @@ impl Disturbance {
             let Estimate { value, low, high } = share(sum, self.draws as f64);
             [value, low, high]
         };
-        let outcome = |((_, scheme), sums): ((usize, &'static str), Sums)| Outcome {
+        let outcome = |((_, scheme), sums): ((usize, &'static str), Sums)| DisturbanceOutcome {
             case: case.to_owned(),
             scheme,
             bins: sums.bins,
@@ -212,19 +212,22 @@ impl Disturbance {
             lost: ends(sums.lost),
             mean_error_m: super::found::mean(sums.errors_m.into_iter()),
         };
-        let mut outcomes: Vec<Outcome> = by_scheme.into_iter().map(outcome).collect();
-        let of = |scheme| outcomes.iter().find(|outcome| outcome.scheme == scheme);
-        let of_equal_silicon = of("guided").zip(of("full")).map(|(guided, full)| {
-            let with_histogram = 1.0 / full.bins.div_ceil(guided.bins) as f64;
-            let of_draws = |share: f64| ends(share * self.draws as f64);
-            Outcome {
-                scheme: EQUAL_SILICON,
-                bins: guided.bins,
-                wrong: of_draws(full.wrong[0] * with_histogram),
-                lost: of_draws(1.0 - (1.0 - full.lost[0]) * with_histogram),
-                ..full.clone()
-            }
-        });
+        let mut outcomes: Vec<DisturbanceOutcome> = by_scheme.into_iter().map(outcome).collect();
+        let scheme_outcome = |scheme| outcomes.iter().find(|outcome| outcome.scheme == scheme);
+        let of_equal_silicon =
+            scheme_outcome("guided")
+                .zip(scheme_outcome("full"))
+                .map(|(guided, full)| {
+                    let with_histogram = 1.0 / full.bins.div_ceil(guided.bins) as f64;
+                    let of_draws = |share: f64| ends(share * self.draws as f64);
+                    DisturbanceOutcome {
+                        scheme: EQUAL_SILICON,
+                        bins: guided.bins,
+                        wrong: of_draws(full.wrong[0] * with_histogram),
+                        lost: of_draws(1.0 - (1.0 - full.lost[0]) * with_histogram),
+                        ..full.clone()
+                    }
+                });
         outcomes.extend(of_equal_silicon);
         Ok(outcomes)
     }
@@ -252,10 +255,10 @@ mod tests {
         };
         let outcomes = disturbance.outcomes(&demonstrator, 1, || ()).unwrap();
         let wrong = |case: &str, scheme: &str| {
-            let mut of = outcomes
+            let mut matching = outcomes
                 .iter()
                 .filter(|o| o.case == case && o.scheme == scheme);
-            of.next().unwrap().wrong[0]
+            matching.next().unwrap().wrong[0]
         };
         assert!(wrong("still", "full") > 0.2, "{outcomes:#?}");
         assert!(wrong("still", "sliding") > 0.2);
@@ -265,10 +268,10 @@ mod tests {
         assert!(wrong("still", "guided") < 0.05);
         // A bin of the guided chip's memory for 27 of a full histogram.
         let lost = |scheme: &str| {
-            let of = outcomes
+            let outcome = outcomes
                 .iter()
                 .find(|o| o.case == "we wait" && o.scheme == scheme);
-            of.unwrap().lost[0]
+            outcome.unwrap().lost[0]
         };
         let with_depth = [1.0 - lost("full"), 1.0 - lost(EQUAL_SILICON)];
         assert!(

@@ -7,7 +7,7 @@ use crate::system::{NoDepth, PixelDepth};
 
 /// What became of the macropixels that see a target.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
-pub(crate) struct Found {
+pub(crate) struct TargetSummary {
     /// Macropixels that see it.
     pub(crate) seen_by: usize,
     /// Those with it in their window.
@@ -33,10 +33,10 @@ pub(crate) struct Found {
 /// Of the macropixels on a target, this share has to be right for it to be found: chosen, so that what is missed is the minority.
 const ENOUGH: f64 = 0.5;
 
-impl Found {
+impl TargetSummary {
     /// These macropixels, with bins of `bin_m`.
-    pub(crate) fn of<'p>(pixels: impl Iterator<Item = &'p PixelDepth>, bin_m: f64) -> Self {
-        let mut found = Found::default();
+    pub(crate) fn summarise<'p>(pixels: impl Iterator<Item = &'p PixelDepth>, bin_m: f64) -> Self {
+        let mut found = TargetSummary::default();
         let (mut truths, mut depths, mut guides) = (Vec::new(), Vec::new(), Vec::new());
         for pixel in pixels {
             found.seen_by += 1;
@@ -72,7 +72,7 @@ impl Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for TargetSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(true_m) = self.true_m else {
             return write!(f, "out of view");
@@ -129,7 +129,7 @@ mod tests {
         let right = pixel(Some(40.1), true);
         let wrong = pixel(Some(42.0), true);
         let missed = pixel(None, false);
-        let found = Found::of([&right, &right, &wrong, &missed].into_iter(), 0.39);
+        let found = TargetSummary::summarise([&right, &right, &wrong, &missed].into_iter(), 0.39);
         assert!(found.is_found());
         assert_eq!((found.seen_by, found.right, found.wrong), (4, 2, 1));
         assert_eq!(
@@ -143,8 +143,11 @@ mod tests {
             text,
             "found at 40.0 m: 2 of 4 right to a bin (RMS 0.100 m), 1 wrong, 1 target outside window"
         );
-        let lost = Found::of([&right, &missed, &missed].into_iter(), 0.39);
+        let lost = TargetSummary::summarise([&right, &missed, &missed].into_iter(), 0.39);
         assert!(!lost.is_found());
-        assert_eq!(Found::of([].into_iter(), 0.39).to_string(), "out of view");
+        assert_eq!(
+            TargetSummary::summarise([].into_iter(), 0.39).to_string(),
+            "out of view"
+        );
     }
 }

@@ -4,11 +4,11 @@
 //! laser cycles of that exposure see of a target of 10 % at 190 m, and whether the guide's windows hold it, is measured for more and
 //! more laser energy and for better and better stereo.
 
-use super::found::Found;
+use super::found::TargetSummary;
 use super::scenes;
 use crate::chip::{Exposure, Sensor};
 use crate::scene::{DVec3, GroundTruth, Scene, Stereo};
-use crate::system::{Drive, DriveSettings, FrameClock, FrameError, FrameSettings};
+use crate::system::{DriveSettings, DriveSimulation, FrameClock, FrameError, FrameSettings};
 
 /// Where the target stands, m. The chip's last window ends at 2⁹ bins, 199.9 m: a target at 200 m is outside all of them, and one just
 /// before it where the guide is wrong by a little.
@@ -38,7 +38,7 @@ pub(crate) struct Limit {
     /// Time from frame to frame, s.
     pub(crate) period_s: f64,
     /// What became of the target's macropixels in all frames.
-    pub(crate) found: Found,
+    pub(crate) found: TargetSummary,
 }
 
 /// Two frames for every laser, energy and guide; `done` is called after each pair.
@@ -88,7 +88,7 @@ fn limit(
         only: Some(only.clone()),
         ..DriveSettings::new(frame)
     };
-    let mut drive = Drive::new(&settings)?;
+    let mut drive = DriveSimulation::new(&settings)?;
     let period_s = drive.period_s();
     let mut pixels = Vec::new();
     let mut bin_m = 0.0;
@@ -104,7 +104,7 @@ fn limit(
         energy,
         disparity_px,
         period_s,
-        found: Found::of(pixels.iter(), bin_m),
+        found: TargetSummary::summarise(pixels.iter(), bin_m),
     })
 }
 

@@ -5,7 +5,7 @@
 //!   scene in motion ─► guide ─► windows ─► 16 000 laser cycles at 80 kHz ─► histograms ─► depths, three times a second
 //! ```
 //!
-//! Every demo is a drive ([`Drive`](crate::system::Drive)) of the whole chain, with what is asked of it measured at the end: whether a
+//! Every demo is a drive ([`DriveSimulation`](crate::system::DriveSimulation)) of the whole chain, with what is asked of it measured at the end: whether a
 //! target was found, and if not, why not.
 
 pub(crate) mod disturbed;
@@ -21,7 +21,7 @@ pub(crate) mod sweep;
 use crate::chip::{Exposure, Sensor, hslidar_delay_line};
 use crate::ranging::BinProfile;
 use crate::scene::Scene;
-use crate::system::{DriveSettings, FrameSettings, Sweep, SweepError, calibrate};
+use crate::system::{BinSweepError, DriveSettings, FrameSettings, Sweep, calibrate};
 use crate::units::Time;
 
 /// CLK periods in a laser cycle: 80 kHz on a CLK of 80 MHz (Table 14).
@@ -42,18 +42,18 @@ impl Demonstrator {
     ///
     /// # Errors
     /// What the sweep reports.
-    pub(crate) fn calibrated(step: Time, swept: impl Fn() + Sync) -> Result<Self, SweepError> {
+    pub(crate) fn calibrated(step: Time, swept: impl Fn() + Sync) -> Result<Self, BinSweepError> {
         let sensor: Sensor = hslidar_delay_line();
         let sweep = Sweep {
             step,
             ..Sweep::default()
         };
         let calibrated = calibrate(&sensor, STOP_PERIODS, &sweep, swept)?;
-        Ok(Self::of(calibrated.profile))
+        Ok(Self::new(calibrated.profile))
     }
 
     /// The chip that a calibration is of, perhaps with fewer rows.
-    pub(crate) fn of(calibration: BinProfile) -> Self {
+    pub(crate) fn new(calibration: BinProfile) -> Self {
         Demonstrator {
             exposure: Exposure::new(&calibration.sensor, STOP_PERIODS, LASER_CYCLES),
             sensor: Sensor::from(&calibration.sensor),

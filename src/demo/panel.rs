@@ -61,9 +61,9 @@ impl Panel<'_> {
         let camera_cols = cols * CAMERA_RAYS.0 as usize;
         picture.raster((left, first + TEXT_PX), camera_cols, ray_px, camera);
         let pixels = &self.frame.pixels;
-        let depths = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<_> {
+        let depths = |depth: &dyn Fn(usize) -> Option<f64>| -> Vec<_> {
             (0..pixels.len())
-                .map(|pixel| of(pixel).map_or(VOID, |m| colour_of(m, self.range_m)))
+                .map(|pixel| depth(pixel).map_or(VOID, |m| colour_of(m, self.range_m)))
                 .collect()
         };
         let maps = [
@@ -107,7 +107,7 @@ impl Panel<'_> {
     fn camera(&self, rows: u32, cols: u32) -> Vec<[u8; 3]> {
         let (wide, high) = CAMERA_RAYS;
         let camera = self.world.lidar_camera(rows, cols);
-        let stage = Stage::of(self.world);
+        let stage = Stage::new(self.world);
         let sun = DVec3::new(-0.3, -0.6, -0.74);
         let grey = |row: u32, col: u32| {
             let at = (

@@ -14,14 +14,16 @@
 use rayon::prelude::*;
 
 use super::Demonstrator;
-use super::found::Found;
+use super::found::TargetSummary;
 use crate::chip::{Exposure, Sensor, SensorConfig, Tdc, WindowLaw, hslidar};
 use crate::engine::{Histograms, LitPixel, Window, expose};
 use crate::guide::GuideMap;
 use crate::photon::PixelLight;
 use crate::ranging::DepthOptions;
 use crate::scene::{GroundTruth, Scene};
-use crate::system::{FrameError, Known, PixelDepth, Pointing, Ranger, WindowPolicy, photon_stream};
+use crate::system::{
+    FrameError, PixelContext, PixelDepth, Pointing, Ranger, WindowPolicy, photon_stream,
+};
 use crate::units::{Time, TimeOfFlight};
 
 /// How far full, sliding and zooming histograms look, m: the demonstrator's 75 m and a little.
@@ -31,7 +33,7 @@ const ZOOM_BINS_S: [f64; 2] = [166e-9, 20.8e-9];
 
 /// What a scheme makes of a target.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub(crate) struct Outcome {
+pub(crate) struct SchemeOutcome {
     /// The scheme.
     pub(crate) scheme: &'static str,
     /// Bins that each macropixel needs at once.
@@ -39,7 +41,7 @@ pub(crate) struct Outcome {
     /// Exposures between which windows change.
     pub(crate) exposures: usize,
     /// What became of the target.
-    pub(crate) found: Found,
+    pub(crate) found: TargetSummary,
 }
 
 /// A still world before the chip, and the macropixels that matter.
@@ -62,7 +64,7 @@ pub(crate) fn compare(
     guide: &GuideMap,
     pixels: &[usize],
     seed: u64,
-) -> Result<Vec<Outcome>, FrameError> {
+) -> Result<Vec<SchemeOutcome>, FrameError> {
     let sensor = &demonstrator.sensor;
     let truth = GroundTruth::render(world, sensor.rows as u32, sensor.cols as u32);
     let bench = Bench {
@@ -99,11 +101,11 @@ pub(crate) fn compare(
     let full = windows(cycles, false)?;
     let sliding = windows((cycles / starts.len() as u32).max(1), true)?;
     let zooming = bench.zoom(cycles / 3)?;
-    let outcome = |scheme, bins, exposures, depths: Vec<PixelDepth>| Outcome {
+    let outcome = |scheme, bins, exposures, depths: Vec<PixelDepth>| SchemeOutcome {
         scheme,
         bins,
         exposures,
-        found: Found::of(depths.iter(), 0.39),
+        found: TargetSummary::summarise(depths.iter(), 0.39),
     };
     // Windows overlap: a full histogram has the bins of one step of each, and the rest of the last.
     let step_bins = 12.5 / 2.6;
@@ -146,7 +148,7 @@ fn best(windows: &[Vec<PixelDepth>], prefers: Preference) -> Vec<PixelDepth> {
 }
 
 impl Bench<'_> {
-    fn lit(&self, start_of: impl Fn(usize) -> Option<u16>, farthest: u16) -> Vec<LitPixel> {
+    fn lit_pixels(&self, start_of: impl Fn(usize) -> Option<u16>, farthest: u16) -> Vec<LitPixel> {
         let pixels = self.pixels.iter();
         pixels
             .map(|&pixel| LitPixel {
@@ -191,10 +193,10 @@ impl Bench<'_> {
             ..options
         };
         let ranger = Ranger::new(sensor, &exposure, self.world, &options, Some(calibration))?;
-        let lit = self.lit(&start_of, sensor.largest_start());
+        let lit = self.lit_pixels(&start_of, sensor.largest_start());
         let histograms = self.expose(sensor, &exposure, salt, &lit)?;
         let depth = |(n, &pixel): (usize, &usize)| {
-            let known = Known {
+            let known = PixelContext {
                 pixel,
                 start: start_of(pixel),
                 true_m: self.truth.range_m[pixel],
@@ -226,7 +228,7 @@ impl Bench<'_> {
                 let at = self.pixels.iter().position(|&p| p == pixel);
                 starts[at.expect("one of them")]
             };
-            let lit = self.lit(place, sensor.largest_start());
+            let lit = self.lit_pixels(place, sensor.largest_start());
             let histograms = self.expose(&sensor, &exposure, 900 + step as u64, &lit)?;
             for ((look, start), counts) in looks.iter_mut().zip(&starts).zip(&histograms) {
                 let window = start.and_then(|start| law.window(start).open());

@@ -1,13 +1,15 @@
 //! A scene shown as in Fig. 99 to 102: a drive through it, what became of its targets in every frame, and some frames as pictures.
 
 use super::Demonstrator;
-use super::found::Found;
+use super::found::TargetSummary;
 use super::panel::Panel;
-use super::schemes::{self, Outcome};
+use super::schemes::{self, SchemeOutcome};
 use crate::report::CloudPoint;
 use crate::report::picture::Picture;
 use crate::scene::{GroundTruth, Scene};
-use crate::system::{Drive, DriveFrame, DriveSettings, FrameError, FrameTimes, PhaseTimes, cloud};
+use crate::system::{
+    DriveFrame, DriveSettings, DriveSimulation, FrameError, FrameTimes, PhaseTimes, cloud,
+};
 
 /// Something that is to be found: all objects whose name begins so.
 #[derive(Debug, Clone)]
@@ -30,9 +32,9 @@ impl Target {
     }
 
     /// What became of it in a frame.
-    pub(crate) fn found(&self, frame: &DriveFrame) -> Found {
+    pub(crate) fn summary(&self, frame: &DriveFrame) -> TargetSummary {
         let pixels = self.pixels(&frame.truth).map(|pixel| &frame.pixels[pixel]);
-        Found::of(pixels, frame.bin_m)
+        TargetSummary::summarise(pixels, frame.bin_m)
     }
 
     /// The macropixels that see it.
@@ -80,14 +82,14 @@ pub(crate) struct ShownFrame {
     /// When what happened.
     pub(crate) times: FrameTimes,
     /// Each target.
-    pub(crate) targets: Vec<Found>,
+    pub(crate) targets: Vec<TargetSummary>,
     /// What the simulation took.
     pub(crate) run_times: PhaseTimes,
 }
 
 /// A show that has been run.
 #[derive(Debug, Clone)]
-pub(crate) struct Shown {
+pub(crate) struct ShowResult {
     /// Its frames.
     pub(crate) frames: Vec<ShownFrame>,
     /// Frames as pictures, with their numbers.
@@ -99,7 +101,7 @@ pub(crate) struct Shown {
     /// What load, exposure and readout take, s.
     pub(crate) chip_s: [f64; 3],
     /// Other schemes in the last frame.
-    pub(crate) schemes: Vec<Outcome>,
+    pub(crate) schemes: Vec<SchemeOutcome>,
 }
 
 /// Macropixels of a target on which schemes are compared, at most: a full histogram exposes each of them forty times.
@@ -114,9 +116,9 @@ impl Show {
         &self,
         demonstrator: &Demonstrator,
         done: impl Fn(),
-    ) -> Result<Shown, FrameError> {
-        let mut drive = Drive::new(&self.settings)?;
-        let mut shown = Shown {
+    ) -> Result<ShowResult, FrameError> {
+        let mut drive = DriveSimulation::new(&self.settings)?;
+        let mut shown = ShowResult {
             frames: Vec::new(),
             pictures: Vec::new(),
             clouds: Vec::new(),
@@ -139,7 +141,7 @@ impl Show {
             shown.frames.push(ShownFrame {
                 number,
                 times: frame.times,
-                targets: self.targets.iter().map(|t| t.found(&frame)).collect(),
+                targets: self.targets.iter().map(|t| t.summary(&frame)).collect(),
                 run_times: frame.run_times,
             });
             done();
@@ -151,8 +153,8 @@ impl Show {
         &self,
         demonstrator: &Demonstrator,
         frame: &DriveFrame,
-    ) -> Result<Vec<Outcome>, FrameError> {
-        let world = self.settings.frame.scene.at(frame.times.middle_s());
+    ) -> Result<Vec<SchemeOutcome>, FrameError> {
+        let world = self.settings.frame.scene.snapshot(frame.times.middle_s());
         let pixels: Vec<usize> = self.targets[0].pixels(&frame.truth).collect();
         let every = pixels.len().div_ceil(COMPARED).max(1);
         let pixels: Vec<usize> = pixels.into_iter().step_by(every).collect();
@@ -165,7 +167,7 @@ impl Show {
     }
 
     fn picture(&self, frame: &DriveFrame) -> Picture {
-        let world = self.settings.frame.scene.at(frame.times.middle_s());
+        let world = self.settings.frame.scene.snapshot(frame.times.middle_s());
         let middles = self.targets.iter();
         let samples: Vec<(&str, (usize, usize))> = middles
             .filter_map(|target| Some((target.name, target.middle(&frame.truth)?)))

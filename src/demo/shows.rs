@@ -30,7 +30,7 @@ pub(crate) fn van_at(
     seed: u64,
 ) -> Show {
     let name = format!("van_{speed_m_s}mps_{distance_m:.0}m");
-    let mut show = of(demonstrator, name, scenes::van(speed_m_s), "van", seed);
+    let mut show = target_show(demonstrator, name, scenes::van(speed_m_s), "van", seed);
     show.settings.start_s = (distance_m - 20.0) / speed_m_s;
     show
 }
@@ -62,7 +62,7 @@ pub(crate) fn yaw(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
 pub(crate) fn pedestrian(demonstrator: &Demonstrator, yaw_deg: f64, seed: u64) -> Show {
     let scene = scenes::pedestrian(yaw_deg);
     let name = format!("yaw_{yaw_deg:+.2}deg");
-    of(demonstrator, name, scene, "pedestrian", seed)
+    target_show(demonstrator, name, scene, "pedestrian", seed)
 }
 
 /// A car drives away at up to 65 mph while frames come three times a second (6.5.3), the last time with a guide that predicts.
@@ -77,7 +77,7 @@ pub(crate) fn speed(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
 /// The car at `mph`.
 pub(crate) fn car(demonstrator: &Demonstrator, mph: f64, seed: u64) -> Show {
     let scene = scenes::car(metres_per_second(mph));
-    of(
+    target_show(
         demonstrator,
         format!("speed_{mph:.0}mph"),
         scene,
@@ -124,7 +124,7 @@ fn in_fog(
 ) -> Show {
     let scene = scenes::fog(visibility_m);
     let name = format!("fog_{visibility_m:.0}m_{target}");
-    let mut show = of(demonstrator, name, scene, target, seed);
+    let mut show = target_show(demonstrator, name, scene, target, seed);
     show.settings.start_s = start_s;
     show.frames = 2;
     show.pictures = vec![1];
@@ -139,7 +139,7 @@ const WITH_THE_CAR_FAR_S: f64 = 5.65;
 
 /// A figure behind a glass door (Fig. 102).
 pub(crate) fn glass(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
-    let mut show = of(
+    let mut show = target_show(
         demonstrator,
         "glass".into(),
         scenes::built_in("glass"),
@@ -155,7 +155,7 @@ pub(crate) fn glass(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
 /// and hold what they find.
 pub(crate) fn night(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
     let scene = scenes::built_in("night");
-    let mut show = of(
+    let mut show = target_show(
         demonstrator,
         "night".into(),
         scene.clone(),
@@ -183,7 +183,7 @@ fn metres_per_second(mph: f64) -> f64 {
 }
 
 /// Four frames of a scene with one target.
-fn of(
+fn target_show(
     demonstrator: &Demonstrator,
     name: String,
     scene: Scene,

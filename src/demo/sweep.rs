@@ -5,7 +5,7 @@ use super::found::mean;
 use super::scenes::figure_at;
 use crate::report::{Axis, Chart};
 use crate::scene::GroundTruth;
-use crate::system::{Drive, FrameError, FrameSettings, PixelDepth};
+use crate::system::{DriveSimulation, FrameError, FrameSettings, PixelDepth};
 
 /// Illuminance, klux.
 pub(crate) const KLUX: f64 = 72.0;
@@ -92,7 +92,7 @@ pub(crate) fn point_with(
     let square = square_on(&truth);
     settings.only = Some(square.clone());
     change(&mut settings.frame);
-    let mut drive = Drive::new(&settings)?;
+    let mut drive = DriveSimulation::new(&settings)?;
     let mut pixels: Vec<PixelDepth> = Vec::new();
     for _ in 0..FRAMES {
         let frame = drive.frame(|_| {})?;
@@ -121,7 +121,7 @@ pub(crate) fn point_with(
 
 /// Fig. 103, 104 and 105, with their numbers.
 pub(crate) fn charts(points: &[SweepPoint]) -> [(u32, Chart); 3] {
-    let at = |y: fn(&SweepPoint) -> f64| -> Vec<(f64, f64)> {
+    let curve = |y: fn(&SweepPoint) -> f64| -> Vec<(f64, f64)> {
         points.iter().map(|p| (p.distance_m, y(p))).collect()
     };
     let title = "9 frames of 3×3 macropixels at 72 klux";
@@ -135,24 +135,24 @@ pub(crate) fn charts(points: &[SweepPoint]) -> [(u32, Chart); 3] {
         Axis::linear("measured distance (m)"),
     )
     .whiskers("3 σ", whiskers)
-    .points("mean", at(|p| p.distance_m + p.mean_error_m))
-    .dashed("true", at(|p| p.distance_m));
+    .points("mean", curve(|p| p.distance_m + p.mean_error_m))
+    .dashed("true", curve(|p| p.distance_m));
     let sigma = Chart::new(
         format!("Standard deviation, {title}"),
         Axis::linear("distance (m)"),
         Axis::linear("σ (m)"),
     )
-    .points("measured on the model", at(|p| p.sigma_m))
-    .dashed("0.1 % of the distance", at(|p| 1e-3 * p.distance_m));
+    .points("measured on the model", curve(|p| p.sigma_m))
+    .dashed("0.1 % of the distance", curve(|p| 1e-3 * p.distance_m));
     let rms = Chart::new(
         format!("RMS error, {title}"),
         Axis::linear("distance (m)"),
         Axis::log("RMS error (m)"),
     )
-    .points("guided lidar", at(|p| p.rms_m))
-    .points("its stereo guide", at(|p| p.guide_rms_m))
-    .dashed("a quarter of a pixel, Eq. 27", at(|p| p.guide_theory_m))
-    .line("published, at most 0.15 m", at(|_| 0.15));
+    .points("guided lidar", curve(|p| p.rms_m))
+    .points("its stereo guide", curve(|p| p.guide_rms_m))
+    .dashed("a quarter of a pixel, Eq. 27", curve(|p| p.guide_theory_m))
+    .line("published, at most 0.15 m", curve(|_| 0.15));
     [(103, mean), (104, sigma), (105, rms)]
 }
 
@@ -163,7 +163,8 @@ fn square_on(truth: &GroundTruth) -> Vec<bool> {
         .filter(|&pixel| truth.object[pixel] == Some(1))
         .map(|pixel| ((pixel / cols) as f64, (pixel % cols) as f64))
         .collect();
-    let middle = |of: fn(&(f64, f64)) -> f64| mean(on_it.iter().map(of)).unwrap_or(0.0);
+    let middle =
+        |coordinate: fn(&(f64, f64)) -> f64| mean(on_it.iter().map(coordinate)).unwrap_or(0.0);
     let (row, col) = (middle(|p| p.0), middle(|p| p.1));
     // Rows and columns from the one that has the middle less half a side.
     let first = |middle: f64| (middle - (SIDE - 1) as f64 / 2.0).round().max(0.0) as usize;

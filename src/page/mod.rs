@@ -38,7 +38,7 @@ impl Page {
     ///
     /// # Errors
     /// A folder that holds neither a frame nor a drive of this version, and files in it that cannot be read.
-    pub(crate) fn of(folder: &Path, called: &Path, every: usize) -> Result<Self, InputError> {
+    pub(crate) fn read(folder: &Path, called: &Path, every: usize) -> Result<Self, InputError> {
         let recording = Recording::read(folder, every)?;
         let packed = Packed::new(&recording, called)?;
         Ok(Page {

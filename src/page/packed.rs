@@ -29,7 +29,7 @@ use crate::chip::SensorConfig;
 use crate::files::InputError;
 use crate::guide::view;
 use crate::scene::{DVec3, Ray, Scene, Stage};
-use crate::system::{NoDepth, RETURNS, Ranger, Return, TakenSettings};
+use crate::system::{DepthReturn, NoDepth, RETURNS, Ranger, TakenSettings};
 use crate::units::TimeOfFlight;
 
 /// Pixels of the camera view across a macropixel.
@@ -204,7 +204,7 @@ fn arrays(
     floats(&|p| Some(found[p].1?.signal_counts));
     floats(&|p| Some(found[p].1?.background_per_bin));
     for of in [
-        (|found| Some(found.depth_m)) as fn(&Return) -> Option<f64>,
+        (|found| Some(found.depth_m)) as fn(&DepthReturn) -> Option<f64>,
         |found| found.bound_m,
         |found| Some(found.photons),
     ] {
@@ -222,7 +222,7 @@ fn arrays(
         let start = known.start.map_or(-1, |start| start as i16);
         bytes.extend(start.to_le_bytes());
     }
-    let scene = scene.at(frame.time_s);
+    let scene = scene.snapshot(frame.time_s);
     for object in objects(&scene, sensor) {
         bytes.extend(object.to_le_bytes());
     }
@@ -238,7 +238,7 @@ fn arrays(
 fn objects(scene: &Scene, sensor: &SensorConfig) -> Vec<u16> {
     let (rows, cols) = (sensor.rows, sensor.cols);
     let camera = scene.lidar_camera(rows as u32, cols as u32);
-    let stage = Stage::of(scene);
+    let stage = Stage::new(scene);
     let pixels = (0..rows * cols).into_par_iter();
     let seen = pixels.map(|pixel| {
         let at = ((pixel % cols) as f64 + 0.5, (pixel / cols) as f64 + 0.5);

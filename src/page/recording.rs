@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::files::{InputError, parse_json, read_array, read_counts, read_text};
 use crate::ranging::BinProfile;
 use crate::request::read_calibration;
-use crate::system::{Known, TakenFrame, TakenSettings};
+use crate::system::{PixelContext, TakenFrame, TakenSettings};
 
 /// A frame, or a drive of many.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ pub(super) struct Recorded {
     pub(super) number: u32,
     /// The middle of the exposure on the scene's clock, s.
     pub(super) time_s: f64,
-    pub(super) known: Vec<Known>,
+    pub(super) known: Vec<PixelContext>,
     /// Macropixel by macropixel, bin by bin.
     pub(super) counts: Vec<u16>,
     /// The summary of the results, as it stands there.
@@ -85,7 +85,7 @@ fn of_frame(folder: &Path, path: &Path) -> Result<Recording, InputError> {
     let shape = [sensor.rows, sensor.cols, sensor.bins];
     let counts = read_counts(&folder.join("histograms.npy"), &shape)?;
     let known = taken.pixels.iter().enumerate();
-    let known = known.map(|(pixel, depth)| Known::of(pixel, depth));
+    let known = known.map(|(pixel, depth)| PixelContext::new(pixel, depth));
     let exposure = &taken.settings.exposure;
     let frame = Recorded {
         number: 0,
@@ -131,7 +131,7 @@ fn of_drive(folder: &Path, path: &Path, every: usize) -> Result<Recording, Input
     let mut frames = Vec::new();
     for (at, line) in lines.into_iter().enumerate().step_by(every) {
         let first = at * pixels;
-        let known = (0..pixels).map(|pixel| Known {
+        let known = (0..pixels).map(|pixel| PixelContext {
             pixel,
             start: u16::try_from(starts[first + pixel]).ok(),
             true_m: some(truth[first + pixel]),

@@ -130,7 +130,7 @@ impl LightSource {
         };
         let stream = PhotonStream::new(&scene.with_pulse(config));
         let middle_s = 0.5 * stream.cycle_start(exposure.laser_cycles).as_s();
-        let truth = GroundTruth::render(&scene.at(middle_s), rows as u32, cols as u32);
+        let truth = GroundTruth::render(&scene.snapshot(middle_s), rows as u32, cols as u32);
         let spads = (&exposure.spads, exposure.layout);
         let cycle_s = stream.config().cycle_s();
         let lights = scene.light_on_layout(&truth, spads, exposure.laser_cycles, cycle_s);

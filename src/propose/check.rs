@@ -1,13 +1,13 @@
 //! Designs on engines: what theory says of them beside `cohort`, and one macropixel at the gates.
 
 use super::goal::Goal;
-use super::point::Point;
+use super::point::DesignPoint;
 use super::problem::Problem;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{Cohort, CohortOptions, EngineError, Expose, Gate, LitPixel, Window, expose};
 use crate::files::InputError;
 use crate::numerics::intervals::{Estimate, deviation, share};
-use crate::photon::{PhotonStream, PixelLight, Purpose, normal, random_stream};
+use crate::photon::{PhotonStream, PixelLight, RandomPurpose, normal, random_stream};
 use crate::ranging::DepthOptions;
 use crate::request::{Spelling, guided_exposure};
 use crate::scene::Scene;
@@ -44,7 +44,7 @@ impl Check {
     }
 
     /// Whether what theory says of this point lies in both intervals.
-    pub fn agrees(&self, point: &Point) -> bool {
+    pub fn agrees(&self, point: &DesignPoint) -> bool {
         self.detection.contains(point.detection) && self.precision_m.contains(point.precision_m)
     }
 }
@@ -59,7 +59,12 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(problem: &Problem, point: &Point, most: u32, seed: u64) -> Result<Self, InputError> {
+    fn new(
+        problem: &Problem,
+        point: &DesignPoint,
+        most: u32,
+        seed: u64,
+    ) -> Result<Self, InputError> {
         let design = &point.design;
         let mut config = problem.config_of(design);
         config.rows = config.rows.min(CHECKED.0);
@@ -79,9 +84,15 @@ impl Bench {
 
     /// Macropixel `number`, its target at the goal's range but for a part of a bin, and its guide's estimate as wrong as the design allows: the
     /// target's range, m, with the macropixel.
-    fn pixel(&self, problem: &Problem, point: &Point, number: u32, seed: u64) -> (f64, LitPixel) {
+    fn pixel(
+        &self,
+        problem: &Problem,
+        point: &DesignPoint,
+        number: u32,
+        seed: u64,
+    ) -> (f64, LitPixel) {
         let design = &point.design;
-        let mut random = random_stream(seed, Purpose::Guide, number, 0);
+        let mut random = random_stream(seed, RandomPurpose::Guide, number, 0);
         let bin_m = 0.5 * SPEED_OF_LIGHT_M_PER_S / design.clk_hz;
         let phase = (f64::from(number) * 0.618_033_988_749_895).fract() - 0.5;
         let range_m = problem.goal().range_m + phase * bin_m;
@@ -103,7 +114,11 @@ impl Bench {
 ///
 /// # Errors
 /// What an engine refuses.
-pub(super) fn check(problem: &Problem, point: &Point, seed: u64) -> Result<Check, FrameError> {
+pub(super) fn check(
+    problem: &Problem,
+    point: &DesignPoint,
+    seed: u64,
+) -> Result<Check, FrameError> {
     let bench = Bench::new(problem, point, u32::MAX, seed)?;
     let pixels = 0..bench.sensor.pixels() as u32;
     let (ranges_m, pixels): (Vec<f64>, Vec<LitPixel>) = pixels
@@ -148,7 +163,11 @@ pub(super) fn check(problem: &Problem, point: &Point, seed: u64) -> Result<Check
 ///
 /// # Errors
 /// What an engine refuses.
-pub fn gates_agree(problem: &Problem, point: &Point, seed: u64) -> Result<(bool, u32), FrameError> {
+pub fn gates_agree(
+    problem: &Problem,
+    point: &DesignPoint,
+    seed: u64,
+) -> Result<(bool, u32), FrameError> {
     let bench = Bench::new(problem, point, GATE_CYCLES, seed)?;
     let (_, pixel) = bench.pixel(problem, point, 0, seed);
     let pixels = [pixel];

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::check::{Check, check};
 use super::front::front;
 use super::goal::Choice;
-use super::point::{Limit, NotFound, Point};
+use super::point::{DesignPoint, Limit, NotFound};
 use super::problem::Problem;
 use crate::system::FrameError;
 
@@ -26,9 +26,9 @@ const ROUNDS: usize = 4;
 
 /// A design, and what `cohort` finds of it: its interval reaches what was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Confirmed {
+pub struct ConfirmedDesign {
     /// The design.
-    pub point: Point,
+    pub point: DesignPoint,
     /// What `cohort` finds of it.
     pub check: Check,
 }
@@ -39,22 +39,23 @@ pub struct Confirmed {
 /// What the nearest design misses, if none is confirmed, and what an engine refuses.
 pub(super) fn confirmed(
     problem: &Problem,
-    mut points: Vec<Point>,
+    mut points: Vec<DesignPoint>,
     seed: u64,
     done: impl Fn() + Sync,
-) -> Result<Vec<Confirmed>, NotFound> {
-    let (mut good, mut chips) = (Vec::<Confirmed>::new(), HashSet::new());
-    let mut nearest: Option<Confirmed> = None;
+) -> Result<Vec<ConfirmedDesign>, NotFound> {
+    let (mut good, mut chips) = (Vec::<ConfirmedDesign>::new(), HashSet::new());
+    let mut nearest: Option<ConfirmedDesign> = None;
     for _ in 0..ROUNDS {
         let best = met(problem, &mut points, &mut chips);
         let new = (best.iter()).filter(|p| !good.iter().any(|known| known.point == **p));
-        let checked: Result<Vec<Confirmed>, FrameError> = (new.collect::<Vec<_>>().par_iter())
-            .map(|&&point| {
-                let check = check(problem, &point, seed)?;
-                done();
-                Ok(Confirmed { point, check })
-            })
-            .collect();
+        let checked: Result<Vec<ConfirmedDesign>, FrameError> =
+            (new.collect::<Vec<_>>().par_iter())
+                .map(|&&point| {
+                    let check = check(problem, &point, seed)?;
+                    done();
+                    Ok(ConfirmedDesign { point, check })
+                })
+                .collect();
         let (reach, miss): (Vec<_>, Vec<_>) =
             (checked?.into_iter()).partition(|one| one.check.reaches(problem.goal()));
         good.extend(reach);
@@ -70,7 +71,7 @@ pub(super) fn confirmed(
                 points.retain(|point| kind(point) != kind(&one.point));
             }
         }
-        let far = |one: &Confirmed| one.check.short_of(problem.goal());
+        let far = |one: &ConfirmedDesign| one.check.short_of(problem.goal());
         nearest = (nearest.into_iter().chain(miss)).min_by(|a, b| far(a).total_cmp(&far(b)));
     }
     match nearest {
@@ -80,22 +81,22 @@ pub(super) fn confirmed(
 }
 
 /// What laser cycles and light leave as it is.
-fn kind(point: &Point) -> (usize, u64, u8, u64) {
+fn kind(point: &DesignPoint) -> (usize, u64, u8, u64) {
     let design = &point.design;
     let [clk, guide] = [design.clk_hz, design.guide_sigma_m].map(f64::to_bits);
     (design.bins, clk, design.threshold, guide)
 }
 
 /// The same design with `times` the laser cycles, or a little more; nothing if these cost more than may be.
-fn longer(problem: &Problem, point: &Point, times: f64) -> Option<Point> {
+fn longer(problem: &Problem, point: &DesignPoint, times: f64) -> Option<DesignPoint> {
     let least = (f64::from(point.design.laser_cycles) * times.max(1.02)).ceil() as u32;
-    let candidate = problem.judge_from(&Choice::of(point, 1.0, false), least);
+    let candidate = problem.judge_from(&Choice::from_point(point, 1.0, false), least);
     let candidate = candidate.ok()?;
     candidate.limit().is_none().then_some(candidate.point)
 }
 
 /// What a check says against a goal.
-fn limit(problem: &Problem, missed: &Confirmed) -> Limit {
+fn limit(problem: &Problem, missed: &ConfirmedDesign) -> Limit {
     let goal = problem.goal();
     Limit::Unconfirmed {
         detection: missed.check.detection.value,
@@ -108,7 +109,7 @@ fn limit(problem: &Problem, missed: &Confirmed) -> Limit {
 /// A chip, by what its timing depends on.
 pub(super) type Chip = (usize, usize, usize, u64);
 
-fn chip(point: &Point) -> Chip {
+fn chip(point: &DesignPoint) -> Chip {
     let design = &point.design;
     (
         design.bins,
@@ -121,11 +122,11 @@ fn chip(point: &Point) -> Chip {
 /// The front of those whose chips meet their timing; the others are taken from `points`. Chips that do are kept in `known`.
 pub(super) fn met(
     problem: &Problem,
-    points: &mut Vec<Point>,
+    points: &mut Vec<DesignPoint>,
     known: &mut HashSet<Chip>,
-) -> Vec<Point> {
+) -> Vec<DesignPoint> {
     loop {
-        let best = front(points.clone(), Point::costs);
+        let best = front(points.clone(), DesignPoint::costs);
         let mut chips = best.clone();
         chips.retain(|point| !known.contains(&chip(point)));
         chips.sort_by_key(chip);

@@ -18,7 +18,7 @@ const CLOSE: f64 = 2e-3;
 
 /// An echo under one THRESHOLD, in bins of one length.
 #[derive(Debug, Clone)]
-pub(super) struct Echo {
+pub(super) struct BinnedEcho {
     /// At every phase, chance and information of every bin.
     phases: Vec<Vec<(f64, f64)>>,
     sigma_bins: f64,
@@ -26,7 +26,7 @@ pub(super) struct Echo {
 
 /// The same through a window in whose middle it is.
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(super) struct WindowedEcho {
     bins: usize,
     /// Neighbouring bins that are tested together.
     pub(super) width: usize,
@@ -38,7 +38,7 @@ pub(super) struct Seen {
     pub(super) fullest: f64,
 }
 
-impl Echo {
+impl BinnedEcho {
     /// Of `signal` photons a laser cycle before `background_hz`, for a sensor's macropixels.
     pub(super) fn new(
         config: &SensorConfig,
@@ -52,7 +52,7 @@ impl Echo {
         };
         let response = Response::new(&wide, 1.0 / config.clk_hz, pulse);
         let sigma_bins = response.pulse_sigma_bins;
-        let at = |phase: usize| {
+        let information = |phase: usize| {
             let offset = (phase as f64 + 0.5) / PHASES as f64 - 0.5;
             response.information(&EchoLight {
                 position_bins: (BINS / 2) as f64 + offset,
@@ -61,14 +61,14 @@ impl Echo {
                 sigma_bins,
             })
         };
-        Echo {
-            phases: (0..PHASES).map(at).collect(),
+        BinnedEcho {
+            phases: (0..PHASES).map(information).collect(),
             sigma_bins,
         }
     }
 
     /// Through a window of `bins` bins.
-    pub(super) fn through(&self, bins: usize) -> Seen {
+    pub(super) fn windowed(&self, bins: usize) -> WindowedEcho {
         let first = BINS / 2 - bins / 2;
         let windows = || self.phases.iter().map(|phase| &phase[first..first + bins]);
         let width = Scan::matched(self.sigma_bins, bins, 1).width;
@@ -96,7 +96,7 @@ impl Echo {
             each.sum::<f64>() / (2 * PHASES) as f64
         };
         let all = windows().flatten().map(|bin| bin.0);
-        Seen {
+        WindowedEcho {
             bins,
             width,
             chances: chances.collect(),
@@ -106,7 +106,7 @@ impl Echo {
     }
 }
 
-impl Seen {
+impl WindowedEcho {
     /// How often the target is found after `laser_cycles` where the window holds it.
     pub(super) fn detection(&self, laser_cycles: u32) -> f64 {
         let scan = Scan {

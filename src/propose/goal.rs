@@ -3,7 +3,7 @@
 use serde::Serialize;
 use toml::Table;
 
-use super::point::Point;
+use super::point::DesignPoint;
 use crate::settings::Range::{Above, Within};
 use crate::settings::{Settings, keys};
 
@@ -67,7 +67,7 @@ impl Goal {
 
 impl Choice {
     /// The choices of a design, with `times` its energy; its bits too, if they are to stay.
-    pub(super) fn of(point: &Point, times: f64, keeps_bits: bool) -> Self {
+    pub(super) fn from_point(point: &DesignPoint, times: f64, keeps_bits: bool) -> Self {
         let design = &point.design;
         Choice {
             bins: design.bins,

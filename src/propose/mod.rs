@@ -33,9 +33,9 @@ mod search;
 mod tests;
 
 pub use check::{Check, gates_agree};
-pub use confirm::Confirmed;
+pub use confirm::ConfirmedDesign;
 pub use front::{dominates, front};
 pub use goal::{Choice, Goal, Space};
-pub use point::{Candidate, Costs, Design, Limit, NotFound, Point};
+pub use point::{Candidate, ChipDesign, Costs, DesignPoint, Limit, NotFound};
 pub use problem::Problem;
-pub use search::{Found, Own, Step, search};
+pub use search::{Own, SearchResult, SearchStep, search};

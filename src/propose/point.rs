@@ -7,7 +7,7 @@ use crate::system::FrameError;
 
 /// A chip, its laser and its guide.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Design {
+pub struct ChipDesign {
     /// Histogram bins.
     pub bins: usize,
     /// Bits of a bin.
@@ -33,10 +33,10 @@ pub type Costs = [f64; 5];
 
 /// A design and what theory says of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
+pub struct DesignPoint {
     /// The design.
     #[serde(flatten)]
-    pub design: Design,
+    pub design: ChipDesign,
     /// Mean power of the laser at the wanted frame rate, W.
     pub power_w: f64,
     /// Area of a macropixel: um² in a cell library, transistors without one.
@@ -55,7 +55,7 @@ pub struct Point {
     pub times_class_1: f64,
 }
 
-impl Point {
+impl DesignPoint {
     /// What is to be little.
     pub fn costs(&self) -> Costs {
         let guide = 1.0 / self.design.guide_sigma_m;
@@ -78,7 +78,7 @@ impl Point {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
     /// What it would be.
-    pub point: Point,
+    pub point: DesignPoint,
     /// Emission over the limit of class 1, and the rule that is nearest.
     pub eye: (f64, EyeRule),
     /// Time of a frame over what the frame rate leaves.
@@ -90,7 +90,7 @@ pub struct Candidate {
 impl Candidate {
     /// What it breaks, if anything.
     pub fn limit(&self) -> Option<Limit> {
-        let Point { design, .. } = self.point;
+        let DesignPoint { design, .. } = self.point;
         let needed_uj = design.pulse_energy_uj;
         match self {
             Candidate { time: times, .. } if *times > 1.0 => Some(Limit::Time {

@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-use super::echo::{Echo, Seen};
+use super::echo::{BinnedEcho, WindowedEcho};
 use super::goal::{Choice, Goal};
-use super::point::{Candidate, Design, Limit, Point};
+use super::point::{Candidate, ChipDesign, DesignPoint, Limit};
 use crate::analysis::TimingVerdict;
 use crate::chip::{CellLibrary, EventType, Mode, Sensor, SensorConfig, Silicon, Tdc, macropixel};
 use crate::files::InputError;
@@ -130,14 +130,14 @@ impl Problem {
     }
 
     /// The target before a design's laser: a sphere about the lidar.
-    pub fn scene_of(&self, design: &Design) -> Scene {
+    pub fn scene_of(&self, design: &ChipDesign) -> Scene {
         let mut scene = self.scene.clone();
         scene.lidar.pulse_energy_uj = design.pulse_energy_uj;
         scene
     }
 
     /// A design's chip.
-    pub fn config_of(&self, design: &Design) -> SensorConfig {
+    pub fn config_of(&self, design: &ChipDesign) -> SensorConfig {
         SensorConfig {
             bins: design.bins,
             bin_bits: design.bin_bits,
@@ -174,7 +174,7 @@ impl Problem {
                 "has periods of {period}, in which photons of a SPAD cancel, as its dead time is {dead_time}"
             ));
         }
-        let verdict = TimingVerdict::of(config, &Silicon::of(config), (0, 0));
+        let verdict = TimingVerdict::analyse(config, &Silicon::new(config), (0, 0));
         if verdict.is_met() {
             Ok(())
         } else {
@@ -190,7 +190,7 @@ impl Problem {
             return area;
         }
         let circuit = macropixel::circuit(config);
-        let library = CellLibrary::of(config).ok();
+        let library = CellLibrary::from_config(config).ok();
         let area = match library.and_then(CellLibrary::from_file) {
             None => circuit.transistors() as f64,
             Some(library) => {
@@ -204,14 +204,14 @@ impl Problem {
     }
 
     /// The echo of a pulse of this energy.
-    pub(super) fn echo(&self, clk_hz: f64, threshold: u8, pulse_energy_uj: f64) -> Echo {
+    pub(super) fn echo(&self, clk_hz: f64, threshold: u8, pulse_energy_uj: f64) -> BinnedEcho {
         let config = SensorConfig {
             clk_hz,
             threshold,
             ..SensorConfig::clone(&self.sensor)
         };
         let (signal, background_hz) = self.light(pulse_energy_uj);
-        Echo::new(&config, self.scene.echo_width(), signal, background_hz)
+        BinnedEcho::new(&config, self.scene.echo_width(), signal, background_hz)
     }
 
     /// CLK periods to the end of the last window that is needed, and the bits of a P-counter that counts them.
@@ -240,7 +240,7 @@ impl Problem {
     pub(super) fn designs(
         &self,
         window: &Choice,
-        seen: &Seen,
+        seen: &WindowedEcho,
         (least, most): (u32, u32),
         rates_hz: &[f64],
         mut offer: impl FnMut(Candidate),
@@ -285,7 +285,7 @@ impl Problem {
         } else {
             counts / self.most_counts[bin_bits]
         };
-        let mut design = Design {
+        let mut design = ChipDesign {
             bins: window.bins,
             bin_bits,
             counter_bits,
@@ -322,7 +322,7 @@ impl Problem {
                     pulses,
                     frame_s: (1.0 / frames_hz).max(pulses / pulse_hz),
                 };
-                let emission = self.emission.with(window.pulse_energy_uj, train);
+                let emission = self.emission.scaled(window.pulse_energy_uj, train);
                 let judged = emission.beside_class_1().expect("a judged wavelength");
                 (judged.times_class_1, judged.rule)
             };
@@ -344,7 +344,7 @@ impl Problem {
                 }
             }
             offer(Candidate {
-                point: Point {
+                point: DesignPoint {
                     design,
                     power_w: pulse_j * pulses * fps,
                     area,
@@ -367,14 +367,14 @@ impl Problem {
     ///
     /// # Errors
     /// What makes it impossible whatever the laser cycles.
-    pub fn judge(&self, choice: &Choice) -> Result<Candidate, Limit> {
+    pub fn evaluate(&self, choice: &Choice) -> Result<Candidate, Limit> {
         self.judge_from(choice, 1)
     }
 
     /// The same with `least` laser cycles or more.
     pub(super) fn judge_from(&self, choice: &Choice, least: u32) -> Result<Candidate, Limit> {
         let echo = self.echo(choice.clk_hz, choice.threshold, choice.pulse_energy_uj);
-        let (seen, cycles) = (echo.through(choice.bins), (least, MOST_CYCLES));
+        let (seen, cycles) = (echo.windowed(choice.bins), (least, MOST_CYCLES));
         let mut found = None;
         self.designs(choice, &seen, cycles, &[choice.rate_hz], |one| {
             found = Some(one)

@@ -6,10 +6,10 @@
 
 use rayon::prelude::*;
 
-use super::confirm::{Confirmed, confirmed};
+use super::confirm::{ConfirmedDesign, confirmed};
 use super::front::{dominates, front};
 use super::goal::{Choice, Space};
-use super::point::{Candidate, Limit, NotFound, Point};
+use super::point::{Candidate, DesignPoint, Limit, NotFound};
 use super::problem::{MOST_CYCLES, Problem};
 use crate::chip::SensorConfig;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -40,9 +40,9 @@ const ABOVE: i32 = 3;
 
 /// The best designs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct SearchResult {
     /// The Pareto front, the least laser power first.
-    pub front: Vec<Confirmed>,
+    pub front: Vec<ConfirmedDesign>,
     /// Designs that were judged.
     pub tried: u64,
     /// The sensor that all were made from.
@@ -51,7 +51,7 @@ pub struct Found {
 
 /// A step of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
+pub enum SearchStep {
     /// All designs of a CLK and a THRESHOLD are judged.
     Clock,
     /// A design is checked.
@@ -62,16 +62,16 @@ pub enum Step {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Own {
     /// It is on the front.
-    OnFront(Point),
+    OnFront(DesignPoint),
     /// Points of the front beat it, the best first.
-    Beaten(Point, Vec<Point>),
+    Beaten(DesignPoint, Vec<DesignPoint>),
     /// It cannot do it.
     Impossible(Limit),
 }
 
 impl Own {
     /// The sensor with its laser and guide, where it can do it.
-    pub fn point(&self) -> Option<&Point> {
+    pub fn point(&self) -> Option<&DesignPoint> {
         match self {
             Own::OnFront(point) | Own::Beaten(point, _) => Some(point),
             Own::Impossible(_) => None,
@@ -81,16 +81,16 @@ impl Own {
 
 /// What some designs came to.
 #[derive(Debug, Default)]
-struct Gathered {
-    points: Vec<Point>,
+struct SearchTally {
+    points: Vec<DesignPoint>,
     tried: u64,
     /// Of those that only eyes forbid, the nearest to what is allowed; and of the others.
     nearest: [Option<Candidate>; 2],
     limit: Option<Limit>,
 }
 
-impl Gathered {
-    fn take(&mut self, candidate: Candidate) {
+impl SearchTally {
+    fn add(&mut self, candidate: Candidate) {
         self.tried += 1;
         if candidate.limit().is_none() {
             return self.points.push(candidate.point);
@@ -126,12 +126,12 @@ impl Gathered {
         let tried = self.tried + other.tried;
         self.points.extend(other.points);
         let nearest = other.nearest.into_iter().flatten();
-        nearest.for_each(|candidate| self.take(candidate));
+        nearest.for_each(|candidate| self.add(candidate));
         other
             .limit
             .into_iter()
             .for_each(|limit| self.limited(limit));
-        Gathered { tried, ..self }
+        SearchTally { tried, ..self }
     }
 }
 
@@ -150,9 +150,9 @@ fn of_clock(
     (clk_hz, threshold): (f64, u8),
     own: bool,
     above: i32,
-) -> Gathered {
+) -> SearchTally {
     let sensor = problem.sensor();
-    let mut gathered = Gathered::default();
+    let mut gathered = SearchTally::default();
     // What a frame leaves at the most pulses a second, which the target's range allows at best; no limit where limits are sought.
     let most = match above {
         0 => {
@@ -174,7 +174,7 @@ fn of_clock(
             if is_done[at] {
                 continue;
             }
-            let seen = echo.through(bins);
+            let seen = echo.windowed(bins);
             let choice = Choice {
                 bins,
                 clk_hz,
@@ -192,7 +192,7 @@ fn of_clock(
                     guide_sigma_m,
                     ..choice
                 };
-                let take = |candidate| gathered.take(candidate);
+                let take = |candidate| gathered.add(candidate);
                 match problem.designs(&choice, &seen, (least, most), &RATES_HZ, take) {
                     Ok(cycles) => (least, found) = (cycles, true),
                     Err(limit) => {
@@ -215,50 +215,51 @@ fn gather(
     own: bool,
     above: i32,
     done: &(impl Fn() + Sync),
-) -> Gathered {
+) -> SearchTally {
     let clocks = space.clk_hz.iter();
     let clocks = clocks.flat_map(|&clk| space.thresholds.iter().map(move |&t| (clk, t)));
     let clocks: Vec<(f64, u8)> = clocks.collect();
-    let all: Vec<Gathered> = (clocks.par_iter())
+    let all: Vec<SearchTally> = (clocks.par_iter())
         .map(|&clock| {
             let gathered = of_clock(problem, space, clock, own, above);
             done();
             gathered
         })
         .collect();
-    all.into_iter().fold(Gathered::default(), Gathered::and)
+    all.into_iter()
+        .fold(SearchTally::default(), SearchTally::and)
 }
 
 /// Designs of the front with as much energy as costs nothing else, and as much as is allowed.
-fn solved(problem: &Problem, own: bool, points: &[Point]) -> Vec<Point> {
+fn solved(problem: &Problem, own: bool, points: &[DesignPoint]) -> Vec<DesignPoint> {
     let step = libm::pow(10f64, 1.0 / f64::from(A_DECADE));
-    let solve = |point: &Point| -> Vec<Point> {
-        let with = |times: f64| -> Option<Point> {
+    let solve = |point: &DesignPoint| -> Vec<DesignPoint> {
+        let with = |times: f64| -> Option<DesignPoint> {
             // More light takes fewer laser cycles, by the square at most.
             let least = f64::from(point.design.laser_cycles) / (2.0 * times * times);
-            let choice = Choice::of(point, times, own);
+            let choice = Choice::from_point(point, times, own);
             let candidate = problem.judge_from(&choice, 1 + least as u32).ok()?;
             candidate.limit().is_none().then_some(candidate.point)
         };
         let costs = point.costs();
-        let is_no_worse = |p: &Point| p.costs().iter().zip(&costs).all(|(p, own)| p <= own);
+        let is_no_worse = |p: &DesignPoint| p.costs().iter().zip(&costs).all(|(p, own)| p <= own);
         let free = most_times(step, |times| with(times).filter(is_no_worse));
         let allowed = most_times(step, with);
         free.into_iter().chain(allowed).collect()
     };
-    let best = front(points.to_vec(), Point::costs);
+    let best = front(points.to_vec(), DesignPoint::costs);
     best.par_iter().flat_map_iter(solve).collect()
 }
 
 /// What `of` makes of the greatest number from 1 to `step` of which it makes something, to a thousandth; nothing if that is 1 or `step`.
-fn most_times<T>(step: f64, of: impl Fn(f64) -> Option<T>) -> Option<T> {
-    if of(step).is_some() {
+fn most_times<T>(step: f64, attempt: impl Fn(f64) -> Option<T>) -> Option<T> {
+    if attempt(step).is_some() {
         return None;
     }
     let (mut low, mut high, mut found) = (1.0, step, None);
     while high - low > 1e-3 {
         let middle = 0.5 * (low + high);
-        match of(middle) {
+        match attempt(middle) {
             Some(one) => (low, found) = (middle, Some(one)),
             None => high = middle,
         }
@@ -289,8 +290,8 @@ pub fn search(
     problem: &Problem,
     space: &Space,
     seed: u64,
-    done: impl Fn(Step) + Sync,
-) -> Result<Found, NotFound> {
+    done: impl Fn(SearchStep) + Sync,
+) -> Result<SearchResult, NotFound> {
     let mut space = space.clone();
     for values in [&mut space.clk_hz, &mut space.guide_sigma_m] {
         values.sort_by(f64::total_cmp);
@@ -312,7 +313,7 @@ pub fn search(
     if let (true, Some(limit)) = (space.clk_hz.is_empty(), too_fast) {
         return Err(limit.into());
     }
-    let gathered = gather(problem, &space, false, 0, &|| done(Step::Clock));
+    let gathered = gather(problem, &space, false, 0, &|| done(SearchStep::Clock));
     let own_space = Space {
         bins: vec![sensor.bins],
         clk_hz: vec![sensor.clk_hz],
@@ -323,7 +324,7 @@ pub fn search(
     let solved_for = solved(problem, false, &gathered.points);
     let tried = gathered.tried + of_own.tried + solved_for.len() as u64;
     let points = [gathered.points, solved_for].concat();
-    let front = confirmed(problem, points, seed, || done(Step::Check))?;
+    let front = confirmed(problem, points, seed, || done(SearchStep::Check))?;
     if front.is_empty() {
         return Err(limit_of(problem, &space, false).into());
     }
@@ -332,10 +333,10 @@ pub fn search(
         Ok(()) if of_own.points.is_empty() => Own::Impossible(limit_of(problem, &own_space, true)),
         Ok(()) => {
             let solved_for = solved(problem, true, &of_own.points);
-            beside(&front, [of_own.points, solved_for].concat())
+            compare_own(&front, [of_own.points, solved_for].concat())
         }
     };
-    Ok(Found { tried, front, own })
+    Ok(SearchResult { tried, front, own })
 }
 
 /// A chip's timing as a limit.
@@ -347,12 +348,12 @@ fn timed(problem: &Problem, config: &SensorConfig) -> Result<(), Limit> {
 }
 
 /// The sensor's own designs beside the front.
-fn beside(best: &[Confirmed], mut own: Vec<Point>) -> Own {
+fn compare_own(best: &[ConfirmedDesign], mut own: Vec<DesignPoint>) -> Own {
     own.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
-    let beats = |point: &Point| {
+    let beats = |point: &DesignPoint| {
         let own = point.costs();
         let best = best.iter().map(|one| one.point);
-        let mut better: Vec<Point> = best.filter(|p| dominates(&p.costs(), &own)).collect();
+        let mut better: Vec<DesignPoint> = best.filter(|p| dominates(&p.costs(), &own)).collect();
         better.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
         better
     };

@@ -61,7 +61,7 @@ fn the_front_keeps_its_promises() {
     let problem = problem(NEAR);
     let found = search(&problem, &small(), 3, |_| ()).unwrap();
     assert!(found.front.len() > 1);
-    for Confirmed { point, check } in &found.front {
+    for ConfirmedDesign { point, check } in &found.front {
         let design = &point.design;
         let config = problem.config_of(design);
         config.check().unwrap();
@@ -158,7 +158,7 @@ fn the_demonstrators_precision_is_that_of_the_thesis() {
     assert!((signal * 75.0 * 75.0 / 89.0 - 1.0).abs() < 0.01, "{signal}");
     assert!((background_hz / 8e6 - 1.0).abs() < 0.02, "{background_hz}");
     let bin_ns = 2.6;
-    let seen = problem.echo(1e9 / bin_ns, 0, counted_uj).through(8);
+    let seen = problem.echo(1e9 / bin_ns, 0, counted_uj).windowed(8);
     let cycles = seen.variance(0.1) * (bin_ns / time_ns(0.1)).powi(2);
     let sigma_ns = scene.pulse_sigma().as_ns();
     let bound = cramer_rao_laser_cycles(
@@ -248,8 +248,8 @@ fn a_design_by_itself_is_judged_as_among_others() {
     let found = search(&problem, &small(), 3, |_| ()).unwrap();
     let point = found.front[0].point;
     let design = &point.design;
-    let choice = Choice::of(&point, 1.0, false);
-    let candidate = problem.judge(&choice).unwrap();
+    let choice = Choice::from_point(&point, 1.0, false);
+    let candidate = problem.evaluate(&choice).unwrap();
     assert!(candidate.limit().is_none());
     let own = candidate.point.design;
     assert_eq!(
@@ -262,25 +262,25 @@ fn a_design_by_itself_is_judged_as_among_others() {
         guide_sigma_m: 100.0,
         ..choice
     };
-    assert!(matches!(problem.judge(&wide), Err(Limit::Guide { .. })));
+    assert!(matches!(problem.evaluate(&wide), Err(Limit::Guide { .. })));
     let weak = Choice {
         pulse_energy_uj: 1e-9,
         ..choice
     };
-    assert!(matches!(problem.judge(&weak), Err(Limit::Light { .. })));
+    assert!(matches!(problem.evaluate(&weak), Err(Limit::Light { .. })));
     let blinding = Choice {
         pulse_energy_uj: 100.0,
         ..choice
     };
     assert!(matches!(
-        problem.judge(&blinding),
+        problem.evaluate(&blinding),
         Err(Limit::Blinding { .. })
     ));
     let narrow = Choice {
         bin_bits: Some(1),
         ..choice
     };
-    let limit = problem.judge(&narrow).unwrap().limit();
+    let limit = problem.evaluate(&narrow).unwrap().limit();
     assert!(
         matches!(limit, Some(Limit::Counts { bits: 1, .. })),
         "{limit:?}"
@@ -324,7 +324,7 @@ fn no_random_design_beats_the_front() {
             rate_hz: libm::pow(10.0, random.random_range(4.0..6.0)),
             ..Choice::default()
         };
-        let Ok(candidate) = problem.judge(&choice) else {
+        let Ok(candidate) = problem.evaluate(&choice) else {
             continue;
         };
         if candidate.limit().is_some() {

@@ -58,7 +58,7 @@ impl Axis {
 
     /// The same axis from `least` to `greatest`.
     #[must_use]
-    pub(crate) fn between(mut self, least: f64, greatest: f64) -> Self {
+    pub(crate) fn with_range(mut self, least: f64, greatest: f64) -> Self {
         self.range = Some((least, greatest));
         self
     }
@@ -123,7 +123,7 @@ impl Chart {
 
     /// Adds a series and returns the chart, for chaining.
     #[must_use]
-    pub(crate) fn with(
+    pub(crate) fn with_series(
         mut self,
         name: impl Into<String>,
         style: Style,
@@ -137,54 +137,54 @@ impl Chart {
         self
     }
 
-    /// As [`Chart::with`], with a line through `points`.
+    /// As [`Chart::with_series`], with a line through `points`.
     #[must_use]
     pub(crate) fn line(
         self,
         name: impl Into<String>,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
-        self.with(name, Style::Line, points)
+        self.with_series(name, Style::Line, points)
     }
 
-    /// As [`Chart::with`], with a dashed line through `points`.
+    /// As [`Chart::with_series`], with a dashed line through `points`.
     #[must_use]
     pub(crate) fn dashed(
         self,
         name: impl Into<String>,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
-        self.with(name, Style::Dashed, points)
+        self.with_series(name, Style::Dashed, points)
     }
 
-    /// As [`Chart::with`], with a dot at each of `points`.
+    /// As [`Chart::with_series`], with a dot at each of `points`.
     #[must_use]
     pub(crate) fn points(
         self,
         name: impl Into<String>,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
-        self.with(name, Style::Points, points)
+        self.with_series(name, Style::Points, points)
     }
 
-    /// As [`Chart::with`], with a stroke between every two of `points`.
+    /// As [`Chart::with_series`], with a stroke between every two of `points`.
     #[must_use]
     pub(crate) fn whiskers(
         self,
         name: impl Into<String>,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
-        self.with(name, Style::Whiskers, points)
+        self.with_series(name, Style::Whiskers, points)
     }
 
-    /// As [`Chart::with`], with a bar to each of `points`.
+    /// As [`Chart::with_series`], with a bar to each of `points`.
     #[must_use]
     pub(crate) fn bars(
         self,
         name: impl Into<String>,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
-        self.with(name, Style::Bars, points)
+        self.with_series(name, Style::Bars, points)
     }
 
     /// The chart as an SVG document.
@@ -219,7 +219,7 @@ impl Chart {
         Y::CoordDescType: ValueFormatter<f64>,
     {
         area.fill(&WHITE)?;
-        let legend = legend::Legend::of(&self.series);
+        let legend = legend::Legend::new(&self.series);
         let (plot, below) = area.split_vertically(SIZE.1 - legend.height());
         let mut chart = ChartBuilder::on(&plot)
             .caption(&self.title, ("sans-serif", 19))
@@ -351,7 +351,7 @@ mod tests {
     #[test]
     fn every_pair_of_scales_is_drawn_and_text_is_escaped() {
         for x in [Axis::linear("x"), Axis::log("x")] {
-            for y in [Axis::linear("y"), Axis::log("y").between(1.0, 1e3)] {
+            for y in [Axis::linear("y"), Axis::log("y").with_range(1.0, 1e3)] {
                 let svg = chart(x.clone(), y).svg();
                 assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
                 assert!(svg.contains("Squares &amp; more") && svg.contains("&lt;exact&gt;"));

@@ -48,22 +48,22 @@ const LEGEND_LINE_PX: usize = LINE_PX + 6;
 
 /// What a square of the map shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Cell {
+pub enum ImageCell {
     /// A depth, m.
     Depth(f32),
-    /// No depth, for the reason of this number among [`DepthMap::categories`].
+    /// No depth, for the reason of this number among [`DepthImage::categories`].
     Category(usize),
 }
 
 /// A depth map to be drawn.
 #[derive(Debug, Clone)]
-pub struct DepthMap<'a> {
+pub struct DepthImage<'a> {
     /// Above the picture, in ASCII; cut off where the picture ends.
     pub title: &'a str,
     /// Squares in a row.
     pub cols: usize,
     /// Squares, row by row from the top left.
-    pub cells: &'a [Cell],
+    pub cells: &'a [ImageCell],
     /// Ends of the depth scale, m: yellow, violet. Depths beyond take the end's colour. Where yellow is the greater number, as of disparities,
     /// the scale falls.
     pub range_m: (f32, f32),
@@ -76,7 +76,7 @@ pub struct DepthMap<'a> {
     pub scale: usize,
 }
 
-impl DepthMap<'_> {
+impl DepthImage<'_> {
     /// Writes the map as a PNG picture.
     ///
     /// # Errors
@@ -91,7 +91,7 @@ impl DepthMap<'_> {
     }
 
     fn draw(&self) -> Canvas {
-        let &DepthMap {
+        let &DepthImage {
             cols, cells, scale, ..
         } = self;
         let (min_m, max_m) = self.range_m;
@@ -119,8 +119,8 @@ impl DepthMap<'_> {
         for (i, cell) in cells.iter().enumerate() {
             let (left, top) = (MARGIN_PX + i % cols * scale, map_top + i / cols * scale);
             let colour = match *cell {
-                Cell::Depth(depth_m) => step(f64::from(depth_m), range_m),
-                Cell::Category(category) => CATEGORIES + category as u8,
+                ImageCell::Depth(depth_m) => step(f64::from(depth_m), range_m),
+                ImageCell::Category(category) => CATEGORIES + category as u8,
             };
             canvas.fill(left, top, scale, scale, colour);
         }
@@ -153,7 +153,7 @@ impl DepthMap<'_> {
         let (mut left, mut top) = (MARGIN_PX, 0);
         let mut entries = Vec::new();
         for (category, name) in self.categories.iter().enumerate() {
-            let is_this = |cell: &&Cell| **cell == Cell::Category(category);
+            let is_this = |cell: &&ImageCell| **cell == ImageCell::Category(category);
             let count = self.cells.iter().filter(is_this).count();
             if count == 0 {
                 continue;
@@ -283,14 +283,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("d.png");
         let cells = [
-            Cell::Depth(10.0),
-            Cell::Category(0),
-            Cell::Category(2),
-            Cell::Depth(90.0),
-            Cell::Depth(1e9),
-            Cell::Depth(-5.0),
+            ImageCell::Depth(10.0),
+            ImageCell::Category(0),
+            ImageCell::Category(2),
+            ImageCell::Depth(90.0),
+            ImageCell::Depth(1e9),
+            ImageCell::Depth(-5.0),
         ];
-        let map = DepthMap {
+        let map = DepthImage {
             title: "two by three",
             cols: 3,
             cells: &cells,
@@ -302,13 +302,16 @@ mod tests {
         map.write_png(&path).unwrap();
         let (width, _, pixels) = decode(&path);
         let map_top = 2 * MARGIN_PX + LINE_PX;
-        let at = |row: usize, col: usize| {
+        let square = |row: usize, col: usize| {
             pixels[(map_top + row * 8 + 4) * width + MARGIN_PX + col * 8 + 4]
         };
         let (near, far) = (scale_colour(0.0), scale_colour(1.0));
         let [sky, dark, lost] = [0, 1, 2].map(|i| CATEGORY_COLOURS[i]);
-        assert_eq!([at(0, 0), at(0, 1), at(0, 2)], [near, sky, lost]);
-        assert_eq!([at(1, 0), at(1, 1), at(1, 2)], [far, far, near]);
+        assert_eq!(
+            [square(0, 0), square(0, 1), square(0, 2)],
+            [near, sky, lost]
+        );
+        assert_eq!([square(1, 0), square(1, 1), square(1, 2)], [far, far, near]);
         // The legend shows what occurs, and nothing else.
         let legend = &pixels[(map_top + 4 * LINE_PX) * width..];
         assert!(legend.contains(&sky) && legend.contains(&lost) && !legend.contains(&dark));
@@ -323,10 +326,10 @@ mod tests {
         let guide = BehaviouralStereo
             .estimate(&GuideInput::still(&scene, 64, 64, 1))
             .unwrap();
-        let cells: Vec<Cell> = (guide.range_m.iter())
-            .map(|range_m| range_m.map_or(Cell::Category(0), |m| Cell::Depth(m as f32)))
+        let cells: Vec<ImageCell> = (guide.range_m.iter())
+            .map(|range_m| range_m.map_or(ImageCell::Category(0), |m| ImageCell::Depth(m as f32)))
             .collect();
-        let map = DepthMap {
+        let map = DepthImage {
             title: "Guide: stereo range, outdoor",
             cols: 64,
             cells: &cells,
@@ -355,10 +358,10 @@ mod tests {
         let path = dir.path().join("d.png");
         let title = "a title that is far too long for this picture ".repeat(9);
         let long = "a name that is far too long".repeat(9);
-        let map = DepthMap {
+        let map = DepthImage {
             title: &title,
             cols: 1,
-            cells: &[Cell::Depth(0.5)],
+            cells: &[ImageCell::Depth(0.5)],
             range_m: (0.0, 1e-3),
             unit: "m",
             categories: &[],
@@ -366,8 +369,8 @@ mod tests {
         };
         map.write_png(&path).unwrap();
         decode(&path);
-        let map = DepthMap {
-            cells: &[Cell::Category(0)],
+        let map = DepthImage {
+            cells: &[ImageCell::Category(0)],
             range_m: (-2e6, 3e6),
             unit: "m",
             categories: &[&long],

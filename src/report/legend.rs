@@ -29,7 +29,7 @@ const COLOURS: [RGBColor; 12] = [
 
 /// Colour of a series, and the shape of its dots.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Look {
+pub(super) struct SeriesLook {
     /// Of everything drawn.
     pub colour: RGBColor,
     /// Which of the six shapes.
@@ -37,19 +37,19 @@ pub(super) struct Look {
 }
 
 /// How each of `series` looks. Whiskers take the colour of the series before; dots change their shape each time.
-pub(super) fn looks(series: &[Series]) -> impl Iterator<Item = Look> {
+pub(super) fn looks(series: &[Series]) -> impl Iterator<Item = SeriesLook> {
     let (mut coloured, mut dotted) = (0, 0);
     series.iter().map(move |series| {
         coloured += usize::from(series.style != Style::Whiskers);
         dotted += usize::from(series.style == Style::Points);
-        Look {
+        SeriesLook {
             colour: COLOURS[coloured.saturating_sub(1) % COLOURS.len()],
             shape: dotted.saturating_sub(1) % 6,
         }
     })
 }
 
-impl Look {
+impl SeriesLook {
     /// Corners of a dot, in pixels from its place.
     pub(super) fn outline(self) -> Vec<(i32, i32)> {
         match self.shape {
@@ -88,13 +88,13 @@ const WIDTH: i32 = 860;
 
 /// The names of the series, row by row.
 pub(super) struct Legend<'s> {
-    entries: Vec<(&'s Series, Look, (i32, i32))>,
+    entries: Vec<(&'s Series, SeriesLook, (i32, i32))>,
     rows: u32,
 }
 
 impl<'s> Legend<'s> {
     /// Lays out all series that have a name.
-    pub(super) fn of(series: &'s [Series]) -> Self {
+    pub(super) fn new(series: &'s [Series]) -> Self {
         let (mut x, mut row) = (LEFT, 0);
         let named = series.iter().zip(looks(series));
         let entries = named
@@ -204,13 +204,13 @@ mod tests {
         let all: Vec<Series> = (0..14)
             .map(|i| series(&"name ".repeat(1 + i % 5), Style::Line))
             .collect();
-        let legend = Legend::of(&all);
+        let legend = Legend::new(&all);
         assert_eq!(legend.entries.len(), 14);
         for pair in legend.entries.windows(2) {
             let ((a, _, (x, y)), (_, _, (next_x, next_y))) = (pair[0], pair[1]);
             let end = x + SAMPLE + (LETTER * a.name.chars().count() as f64) as i32;
             assert!(end < 900 && (next_y > y || next_x >= end));
         }
-        assert_eq!(Legend::of(&[]).height(), 0);
+        assert_eq!(Legend::new(&[]).height(), 0);
     }
 }

@@ -97,13 +97,13 @@ impl<W: Write> Mcap<W> {
             first_ns: None,
             last_ns: 0,
         };
-        mcap.put(&MAGIC)?;
+        mcap.write_bytes(&MAGIC)?;
         let library = concat!("gdtof ", env!("CARGO_PKG_VERSION"));
-        mcap.put(&Content::default().text("").text(library).record(HEADER))?;
+        mcap.write_bytes(&Content::default().text("").text(library).record(HEADER))?;
         Ok(mcap)
     }
 
-    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+    fn write_bytes(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.at += bytes.len() as u64;
         self.out.write_all(bytes)
     }
@@ -159,13 +159,13 @@ impl<W: Write> Mcap<W> {
             .text("")
             .u64(size)
             .bytes(&records);
-        self.put(&chunk.record(CHUNK))?;
+        self.write_bytes(&chunk.record(CHUNK))?;
         let chunk_length = self.at - begin;
         let mut places = Content::default();
         let begin_of_indices = self.at;
         for (channel, index) in indices {
             places = places.u16(channel as u16 + 1).u64(self.at);
-            self.put(&index)?;
+            self.write_bytes(&index)?;
         }
         let index = Content::default()
             .u64(time_ns)
@@ -185,7 +185,7 @@ impl<W: Write> Mcap<W> {
 
     /// Writes the summary.
     pub(crate) fn finish(mut self) -> io::Result<W> {
-        self.put(&Content::default().u32(0).record(DATA_END))?;
+        self.write_bytes(&Content::default().u32(0).record(DATA_END))?;
         let begin = self.at;
         let mut counts = Content::default();
         for (number, count) in (1u16..).zip(&self.counts) {
@@ -207,10 +207,10 @@ impl<W: Write> Mcap<W> {
         let mut summary = self.definitions();
         summary.extend(statistics);
         summary.extend(self.chunks.concat());
-        self.put(&summary)?;
+        self.write_bytes(&summary)?;
         // No offsets of groups, no checksum.
-        self.put(&Content::default().u64(begin).u64(0).u32(0).record(FOOTER))?;
-        self.put(&MAGIC)?;
+        self.write_bytes(&Content::default().u64(begin).u64(0).u32(0).record(FOOTER))?;
+        self.write_bytes(&MAGIC)?;
         Ok(self.out)
     }
 }

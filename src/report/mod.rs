@@ -21,7 +21,7 @@ pub use chart::{Axis, Chart, Scale};
 pub(crate) use cloud::{CloudPoint, FLOATS, SHORTS, write_pcd, write_ply};
 pub use grid::{Grid, width};
 pub(crate) use grid::{aligned, quoted};
-pub use image::{Cell, DepthMap};
+pub use image::{DepthImage, ImageCell};
 pub(crate) use mcap::{Channel, Mcap};
 pub(crate) use npz::Npz;
 pub use series::{Series, Style};

@@ -1,6 +1,6 @@
 //! Pictures in true colour, composed of panels: rectangles, lines, dots and text in Noto Sans Mono.
 //!
-//! What lies outside the picture is cut off. A [`DepthMap`](super::DepthMap) alone is an indexed picture of its own kind.
+//! What lies outside the picture is cut off. A [`DepthImage`](super::DepthImage) alone is an indexed picture of its own kind.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     impl Picture {
-        fn at(&self, (x, y): (usize, usize)) -> Rgb {
+        fn pixel(&self, (x, y): (usize, usize)) -> Rgb {
             self.pixels[y * self.width + x]
         }
     }
@@ -203,8 +203,8 @@ mod tests {
         picture.dot((-3.0, 4.0), 3, MARK);
         picture.text((17, 0), "W\u{1F600}", INK);
         picture.scale((0, 0), 5, (0.0, 1.0), "m");
-        assert_eq!(picture.at((15, 9)), MARK);
-        assert_eq!(picture.at((12, 5)), INK);
+        assert_eq!(picture.pixel((15, 9)), MARK);
+        assert_eq!(picture.pixel((12, 5)), INK);
     }
 
     #[test]
@@ -219,8 +219,11 @@ mod tests {
         let mut buffer = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut buffer).unwrap();
         assert_eq!(buffer, picture.pixels.as_flattened());
-        assert_eq!([picture.at((2, 1)), picture.at((3, 1))], [MARK, INK]);
-        assert_eq!([picture.at((1, 2)), picture.at((0, 0))], [VOID, PAPER]);
+        assert_eq!([picture.pixel((2, 1)), picture.pixel((3, 1))], [MARK, INK]);
+        assert_eq!(
+            [picture.pixel((1, 2)), picture.pixel((0, 0))],
+            [VOID, PAPER]
+        );
     }
 
     #[test]

@@ -33,23 +33,23 @@ impl Checks {
         found: T,
     ) {
         let holds = expected == found;
-        self.that(what, expected, found, holds);
+        self.add_verdict(what, expected, found, holds);
     }
 
     /// Checks that a time is the expected one, to the femtosecond; printed in nanoseconds.
     pub(crate) fn time(&mut self, what: impl Into<String>, expected: Time, found: Time) {
         let holds = expected == found;
-        self.that(what, exact(expected), exact(found), holds);
+        self.add_verdict(what, exact(expected), exact(found), holds);
     }
 
     /// Checks that all times are the expected one; prints the extremes of those found.
     pub(crate) fn times(&mut self, what: impl Into<String>, expected: Time, found: &[Time]) {
         let holds = !found.is_empty() && found.iter().all(|&t| t == expected);
-        self.that(what, exact(expected), range(found), holds);
+        self.add_verdict(what, exact(expected), range(found), holds);
     }
 
     /// A check whose verdict the caller has reached: `expected` says what was wanted.
-    pub(crate) fn that(
+    pub(crate) fn add_verdict(
         &mut self,
         what: impl Into<String>,
         expected: impl fmt::Display,
@@ -70,7 +70,7 @@ impl Checks {
     }
 
     /// How many checks were made.
-    pub(crate) fn made(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.lines.len()
     }
 

@@ -1,6 +1,6 @@
 //! Claims 2 to 6: what the thesis says of the chip, measured on its netlist.
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::thesis::{chart, claim};
 use crate::analysis::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::chip::readout::{self as readout_blocks, ReadoutOrder};
@@ -34,7 +34,7 @@ struct Edges {
 }
 
 impl Edges {
-    fn of(start: u16) -> Self {
+    fn simulate(start: u16) -> Self {
         let config = SensorConfig {
             rows: 1,
             cols: 1,
@@ -90,13 +90,13 @@ impl Edges {
 }
 
 /// Claim 2: the ripple, and the CLK period it allows.
-pub(super) fn ripple_rows() -> Vec<Row> {
+pub(super) fn ripple_rows() -> Vec<ClaimRow> {
     let claim = claim(2);
     let config = SensorConfig::default();
-    let timing = MacropixelTiming::of(&config, &NOMINAL, Limits::Ignored, (0, 0));
+    let timing = MacropixelTiming::analyse(&config, &NOMINAL, Limits::Ignored, (0, 0));
     let starts = [0, 1, 5, 21, 31, 42, 52, 60];
     let simulated = starts
-        .map(|start| Edges::of(start).ripple_ns())
+        .map(|start| Edges::simulate(start).ripple_ns())
         .into_iter()
         .fold(f64::NEG_INFINITY, f64::max);
     let slow = Time::from_ns(20);
@@ -139,9 +139,9 @@ pub(super) fn figure_56() -> Chart {
 }
 
 /// Claim 3: Fig. 54.
-pub(super) fn fig_54_rows() -> Vec<Row> {
+pub(super) fn fig_54_rows() -> Vec<ClaimRow> {
     let claim = claim(3);
-    let edges = Edges::of(5);
+    let edges = Edges::simulate(5);
     let after_stop = edges
         .counter_clk
         .first()
@@ -154,11 +154,11 @@ pub(super) fn fig_54_rows() -> Vec<Row> {
 }
 
 /// Claim 4: Fig. 48.
-pub(super) fn fig_48_rows() -> Vec<Row> {
+pub(super) fn fig_48_rows() -> Vec<ClaimRow> {
     let claim = claim(4);
     let period = SensorConfig::default().clock().period();
     let [first, second] = [52, 49].map(|start| {
-        let edges = Edges::of(start);
+        let edges = Edges::simulate(start);
         let rise = edges.local_stop.first().copied();
         rise.map_or(f64::NAN, |t| (t - edges.stop).as_ns() / period.as_ns())
     });
@@ -200,10 +200,10 @@ fn fig_48_bins() -> Histograms {
 }
 
 /// Claim 5: the serial load, and the readout that it must not outlast.
-pub(super) fn load_rows() -> Vec<Row> {
+pub(super) fn load_rows() -> Vec<ClaimRow> {
     let claim = claim(5);
     let config = SensorConfig::default();
-    let netlists = PinNetlists::of(&config);
+    let netlists = PinNetlists::new(&config);
     let counts = sparse_counts(&config);
     let all = PIN_CLOCKS_MHZ.map(|mhz| netlists.run_at(mhz, &config, &counts));
     let worst = all
@@ -211,7 +211,7 @@ pub(super) fn load_rows() -> Vec<Row> {
         .map(|times| times.load.as_s() / times.read.as_s());
     let worst = worst.fold(f64::NEG_INFINITY, f64::max);
     let fewest_right = |pick: fn(&PinTimes) -> usize| all.iter().map(pick).min().unwrap_or(0);
-    let pins = ReadoutOrder::of(&config).pins() as f64;
+    let pins = ReadoutOrder::new(&config).pins() as f64;
     let at_200 = &all[3];
     debug_assert_eq!(PIN_CLOCKS_MHZ[3], 200);
 
@@ -253,13 +253,13 @@ fn counter_of(bits: usize) -> SensorConfig {
 }
 
 /// Claim 6: transistors.
-pub(super) fn area_rows() -> Vec<Row> {
+pub(super) fn area_rows() -> Vec<ClaimRow> {
     let claim = claim(6);
     let flip_flop = f64::from(CellKind::Dffr.transistors());
     let stage = PCounter::Ripple.stage_transistors() as f64;
     let stages = PCounter::ALL.map(|p_counter| {
         let what = format!("transistors of {}", p_counter.row().stage);
-        let found = Row::ours(what, "", p_counter.stage_transistors() as f64);
+        let found = ClaimRow::ours(what, "", p_counter.stage_transistors() as f64);
         match p_counter {
             PCounter::SetReset => found.remark("Fig. 51b, the HSLIDAR's."),
             _ => found,

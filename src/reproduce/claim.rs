@@ -76,7 +76,7 @@ impl Verdict {
 
 /// One comparison.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct ClaimRow {
     /// The quantity.
     pub what: String,
     /// Its unit; empty for a pure number.
@@ -97,10 +97,10 @@ pub struct Row {
     pub remark: String,
 }
 
-impl Row {
+impl ClaimRow {
     /// A number of ours beside which nothing is published, and which no list names.
     pub(super) fn ours(what: impl Into<String>, unit: &'static str, computed: f64) -> Self {
-        Row {
+        ClaimRow {
             what: what.into(),
             unit,
             published: Published::Nothing,
@@ -223,7 +223,7 @@ pub struct Claim {
 
 /// The verdict on a claim: the worst of its published rows. One headline that is not modelled, that differs, that is not shown or that was
 /// put in keeps the claim from being met, however many other rows agree.
-pub fn overall(rows: &[Row]) -> Verdict {
+pub fn overall(rows: &[ClaimRow]) -> Verdict {
     let has = |verdict| {
         let mut counting = rows
             .iter()
@@ -246,28 +246,28 @@ mod tests {
     use super::*;
     use crate::numerics::intervals::Estimate;
 
-    impl Row {
+    impl ClaimRow {
         fn holds(what: &str, unit: &'static str, published: Published, computed: f64) -> Self {
-            Row {
+            ClaimRow {
                 published,
-                ..Row::ours(what, unit, computed)
+                ..ClaimRow::ours(what, unit, computed)
             }
         }
 
         fn measured(published: Published, measured: &Estimate) -> Self {
-            Row {
+            ClaimRow {
                 published,
                 interval: Some((measured.low, measured.high)),
-                ..Row::ours("x", "", measured.value)
+                ..ClaimRow::ours("x", "", measured.value)
             }
         }
 
         fn not_modelled(published: Published) -> Self {
-            Row {
+            ClaimRow {
                 published,
                 computed: None,
                 remark: "why".into(),
-                ..Row::ours("x", "m", 0.0)
+                ..ClaimRow::ours("x", "m", 0.0)
             }
         }
 
@@ -284,7 +284,7 @@ mod tests {
 
     #[test]
     fn verdicts_follow_from_range_and_expectation() {
-        let row = |published, computed| Row::holds("x", "m", published, computed);
+        let row = |published, computed| ClaimRow::holds("x", "m", published, computed);
         use Published::*;
         assert_eq!(row(Exactly("0.38"), 0.375).verdict(), Verdict::Agrees);
         assert_eq!(row(Exactly("0.38"), 0.374).verdict(), Verdict::Fails);
@@ -318,7 +318,7 @@ mod tests {
             "an input that is lost on the way"
         );
         assert_eq!(input(1.2).notes(), "chosen");
-        let none = Row::not_modelled(Exactly("1"));
+        let none = ClaimRow::not_modelled(Exactly("1"));
         assert_eq!(none.verdict(), Verdict::NotModelled);
         assert_eq!(none.difference(), None);
     }
@@ -327,7 +327,7 @@ mod tests {
     #[test]
     fn what_chance_could_decide_otherwise_is_not_shown() {
         let row = |published, low, value, high| {
-            let row = Row::measured(published, &Estimate { value, low, high });
+            let row = ClaimRow::measured(published, &Estimate { value, low, high });
             row.differs("why").verdict()
         };
         use Published::*;
@@ -345,7 +345,7 @@ mod tests {
             low: 5.88,
             high: 8.46,
         };
-        let unsure = Row::measured(AtLeast("6"), &measured);
+        let unsure = ClaimRow::measured(AtLeast("6"), &measured);
         assert!(
             unsure.notes().contains("5.880 to 8.460"),
             "{}",
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn quotes_are_found_in_whatever_is_said() {
-        let row = Row::holds("x", "", Published::Says("a b", 0.0, 1.0), 0.5)
+        let row = ClaimRow::holds("x", "", Published::Says("a b", 0.0, 1.0), 0.5)
             .differs("it says “c” and “d e”")
             .remark("“f”, \"not this\"");
         assert_eq!(row.quoted(), ["f", "c", "d e", "a b"]);
@@ -369,18 +369,18 @@ mod tests {
 
     #[test]
     fn what_is_published_as_zero_has_no_relative_difference() {
-        let row = |published, computed| Row::holds("x", "m", published, computed).difference();
+        let row = |published, computed| ClaimRow::holds("x", "m", published, computed).difference();
         assert_eq!(row(Published::Within("0", 0.02), 0.01), Some((0.01, None)));
         assert_eq!(row(Published::Exactly("2"), 1.0), Some((-1.0, Some(-0.5))));
     }
 
     #[test]
     fn a_claim_is_met_only_if_all_its_headlines_are() {
-        let agrees = Row::holds("a", "", Published::Exactly("1"), 1.0);
-        let differs = Row::holds("b", "", Published::Exactly("1"), 2.0).differs("why");
+        let agrees = ClaimRow::holds("a", "", Published::Exactly("1"), 1.0);
+        let differs = ClaimRow::holds("b", "", Published::Exactly("1"), 2.0).differs("why");
         let given = agrees.clone().given("how");
-        let ours = Row::ours("c", "", 1.0);
-        let unsure = Row::measured(
+        let ours = ClaimRow::ours("c", "", 1.0);
+        let unsure = ClaimRow::measured(
             Published::AtLeast("1"),
             &Estimate {
                 value: 2.0,
@@ -388,8 +388,8 @@ mod tests {
                 high: 4.0,
             },
         );
-        let gap = Row::not_modelled(Published::Exactly("1"));
-        let fails = Row::holds("e", "", Published::Exactly("1"), 2.0);
+        let gap = ClaimRow::not_modelled(Published::Exactly("1"));
+        let fails = ClaimRow::holds("e", "", Published::Exactly("1"), 2.0);
         for (rows, verdict) in [
             (vec![&agrees, &ours], Verdict::Agrees),
             (vec![&agrees, &given], Verdict::Given),
@@ -400,7 +400,7 @@ mod tests {
             (vec![&agrees, &gap, &fails.aside()], Verdict::Fails),
             (vec![&ours], Verdict::Ours),
         ] {
-            let rows: Vec<Row> = rows.into_iter().cloned().collect();
+            let rows: Vec<ClaimRow> = rows.into_iter().cloned().collect();
             assert_eq!(overall(&rows), verdict, "{rows:?}");
         }
     }

@@ -10,7 +10,7 @@
 
 use std::sync::OnceLock;
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::parameters::{demonstrator_photons, sigma_over_fwhm};
 use super::thesis::{chart, claim};
 use crate::chip::{Exposure, Sensor, SensorConfig, WindowLaw, hslidar_delay_line};
@@ -41,7 +41,7 @@ fn sensor() -> Sensor {
 }
 
 /// What the chip gives.
-struct Measured {
+struct ChipRanges {
     calibrated: BinProfile,
     /// Range of the plane by every macropixel with bins that are all alike (Eq. 28), m.
     before_m: Vec<f64>,
@@ -50,8 +50,8 @@ struct Measured {
 }
 
 /// Measured once for all that is shown of it.
-fn measured() -> &'static Measured {
-    static MEASURED: OnceLock<Measured> = OnceLock::new();
+fn measured() -> &'static ChipRanges {
+    static MEASURED: OnceLock<ChipRanges> = OnceLock::new();
     MEASURED.get_or_init(|| {
         let sensor = sensor();
         let calibrated = calibrate(&sensor, STOP_PERIODS, &Sweep::default(), || ());
@@ -89,7 +89,7 @@ fn measured() -> &'static Measured {
                 .map(|(pixel, counts)| range_m(profile, pixel, counts))
                 .collect()
         };
-        Measured {
+        ChipRanges {
             before_m: ranges(&ideal),
             after_m: ranges(&calibrated),
             calibrated,
@@ -124,7 +124,7 @@ pub(super) fn lengths_ns() -> Vec<f64> {
 }
 
 /// Claim 20: the delay lines and the plane of Fig. 92.
-pub(super) fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<ClaimRow> {
     let claim = claim(20);
     let (mean_ns, spread_ns) = mean_and_sigma(&lengths_ns());
     let (_, before_m) = mean_and_sigma(&measured().before_m);
@@ -215,7 +215,7 @@ fn counted_light(signal_m2: f64, background_hz: f64) -> CountedLight {
 }
 
 /// Claim 21: the demonstrator's light on its chip.
-pub(super) fn light_rows() -> Vec<Row> {
+pub(super) fn light_rows() -> Vec<ClaimRow> {
     let claim = claim(21);
     let arriving = demonstrator_photons(60.0).link;
     let counted = counted_light(arriving.signal, arriving.background_hz);
@@ -230,21 +230,25 @@ pub(super) fn light_rows() -> Vec<Row> {
 
 /// Fig. 90: the fullest bin of every column at some delays of the laser.
 pub(super) fn figure_90() -> Chart {
-    let Measured { calibrated, .. } = measured();
+    let ChipRanges { calibrated, .. } = measured();
     let cols = calibrated.sensor.cols;
     let first_ns = calibrated.macropixels[0][0].middle_s[0] * 1e9;
     let mut chart = chart(90);
     for step in 0..4 {
         let delay_ns = first_ns + 4.0 + 4.0 * f64::from(step);
-        let of = |pixel: usize| {
+        let nearest_bin = |pixel: usize| {
             let middles = &calibrated.macropixels[pixel][0].middle_s;
             let off = |bin: &usize| (middles[*bin] * 1e9 - delay_ns).abs();
             let bins = 0..middles.len();
             bins.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0) as f64
         };
         let rows = calibrated.sensor.rows;
-        let mean =
-            |col: usize| (0..rows).map(|row| of(row * cols + col)).sum::<f64>() / rows as f64;
+        let mean = |col: usize| {
+            (0..rows)
+                .map(|row| nearest_bin(row * cols + col))
+                .sum::<f64>()
+                / rows as f64
+        };
         let points: Vec<(f64, f64)> = (0..cols).map(|col| (col as f64, mean(col))).collect();
         chart = chart.line(format!("{delay_ns:.0} ns"), points);
     }
@@ -258,7 +262,7 @@ pub(super) fn figure_91() -> Chart {
 
 /// Fig. 92: the plane, by column.
 pub(super) fn figure_92() -> Chart {
-    let Measured {
+    let ChipRanges {
         calibrated,
         before_m,
         after_m,
@@ -311,7 +315,7 @@ mod tests {
     fn the_sweep_finds_every_bin() {
         let sensor = sensor();
         let law = WindowLaw::new(&sensor, &Exposure::new(&sensor, STOP_PERIODS, 16));
-        let Measured { calibrated, .. } = measured();
+        let ChipRanges { calibrated, .. } = measured();
         for pixel in (0..sensor.pixels()).step_by(7) {
             for (parity, &start) in calibrated.starts.iter().enumerate() {
                 let law = law.of_macropixel(pixel as u32);

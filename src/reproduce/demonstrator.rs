@@ -9,12 +9,12 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::delay_line;
 use super::thesis::claim;
-use crate::demo::found::{Found, mean};
-use crate::demo::schemes::Outcome;
-use crate::demo::show::{Show, Shown};
+use crate::demo::found::{TargetSummary, mean};
+use crate::demo::schemes::SchemeOutcome;
+use crate::demo::show::{Show, ShowResult};
 use crate::demo::sweep::{self, SweepPoint};
 use crate::demo::{Demonstrator, shows};
 use crate::guide::NoisyTruth;
@@ -37,7 +37,7 @@ const BRIGHTER: f64 = 0.25;
 
 /// The demonstrator, of four rows.
 fn chain() -> Demonstrator {
-    Demonstrator::of(delay_line::calibrated().clone())
+    Demonstrator::new(delay_line::calibrated().clone())
 }
 
 /// Length of its exposure, s.
@@ -46,31 +46,31 @@ pub(super) fn exposure_s() -> f64 {
 }
 
 /// A show, without its pictures.
-fn run(mut show: Show) -> Shown {
+fn run_show(mut show: Show) -> ShowResult {
     show.pictures.clear();
     let shown = show.run(&chain(), || ());
     shown.expect("the window engine follows delay lines")
 }
 
 /// What became of a show's first target in its frames.
-fn found(show: Show) -> Vec<Found> {
-    let frames = run(show).frames.into_iter();
+fn target_summaries(show: Show) -> Vec<TargetSummary> {
+    let frames = run_show(show).frames.into_iter();
     frames
         .filter_map(|frame| frame.targets.into_iter().next())
         .collect()
 }
 
 /// The share of a target's macropixels over all frames that are `counted`.
-fn share(frames: &[Found], counted: impl Fn(&Found) -> usize) -> f64 {
+fn share(frames: &[TargetSummary], counted: impl Fn(&TargetSummary) -> usize) -> f64 {
     let all: usize = frames.iter().map(|found| found.seen_by).sum();
     frames.iter().map(counted).sum::<usize>() as f64 / all.max(1) as f64
 }
 
-fn share_right(frames: &[Found]) -> f64 {
+fn share_right(frames: &[TargetSummary]) -> f64 {
     share(frames, |found| found.right)
 }
 
-fn share_in_window(frames: &[Found]) -> f64 {
+fn share_in_window(frames: &[TargetSummary]) -> f64 {
     share(frames, |found| found.in_window)
 }
 
@@ -85,7 +85,7 @@ pub(super) fn swept() -> &'static [SweepPoint] {
 
 /// What of the demonstrator is otherwise, to see what σ comes from.
 #[derive(Clone, Copy)]
-struct Otherwise {
+struct DemonstratorVariant {
     /// All elements of its delay lines are alike.
     alike: bool,
     /// Its windows are centred on the figure, to a step.
@@ -94,7 +94,7 @@ struct Otherwise {
     dark: bool,
 }
 
-const AS_IT_IS: Otherwise = Otherwise {
+const AS_IT_IS: DemonstratorVariant = DemonstratorVariant {
     alike: false,
     centred: false,
     dark: false,
@@ -104,9 +104,9 @@ const AS_IT_IS: Otherwise = Otherwise {
 const SWEEPS: u64 = 4;
 
 /// σ of the sweep's last point, m.
-fn sigma_m(otherwise: Otherwise) -> f64 {
+fn sigma_m(otherwise: DemonstratorVariant) -> f64 {
     let demonstrator = if otherwise.alike {
-        Demonstrator::of(delay_line::calibrated_alike())
+        Demonstrator::new(delay_line::calibrated_alike())
     } else {
         chain()
     };
@@ -144,24 +144,25 @@ fn sigma_m(otherwise: Otherwise) -> f64 {
 
 /// Why σ at the end of the sweep is several times `bound_m`, its Cramér-Rao bound: one cause after the other is taken
 /// away.
-pub(super) fn sigma_rows(bound_m: f64) -> Vec<Row> {
+pub(super) fn sigma_rows(bound_m: f64) -> Vec<ClaimRow> {
     let claim = claim(22);
     let (alike, centred) = (
-        Otherwise {
+        DemonstratorVariant {
             alike: true,
             ..AS_IT_IS
         },
-        Otherwise {
+        DemonstratorVariant {
             centred: true,
             ..AS_IT_IS
         },
     );
-    let both = Otherwise {
+    let both = DemonstratorVariant {
         alike: true,
         ..centred
     };
     let ways = [AS_IT_IS, alike, centred, both].map(sigma_m);
-    let [dark, dark_alike] = [centred, both].map(|way| sigma_m(Otherwise { dark: true, ..way }));
+    let [dark, dark_alike] =
+        [centred, both].map(|way| sigma_m(DemonstratorVariant { dark: true, ..way }));
     let over = |row: &str, sigma_m: f64| claim.row(row, sigma_m / bound_m);
     vec![
         over("over_bound", ways[0])
@@ -176,7 +177,7 @@ pub(super) fn sigma_rows(bound_m: f64) -> Vec<Row> {
 }
 
 /// Claim 22: errors to 50 m.
-pub(super) fn error_rows() -> Vec<Row> {
+pub(super) fn error_rows() -> Vec<ClaimRow> {
     let claim = claim(22);
     let points = swept();
     let greatest_m = points.iter().map(|p| p.rms_m).fold(0.0, f64::max);
@@ -210,16 +211,17 @@ pub(super) fn figure_103() -> Chart {
 }
 
 /// Claim 23: the van.
-pub(super) fn tracking_rows() -> Vec<Row> {
+pub(super) fn tracking_rows() -> Vec<ClaimRow> {
     let claim = claim(23);
-    let from = |from_m: f64| found(shows::van_at(&chain(), shows::VAN_M_S, from_m, SEED));
+    let from =
+        |from_m: f64| target_summaries(shows::van_at(&chain(), shows::VAN_M_S, from_m, SEED));
     let legs = VAN_FROM_M.map(from);
     let frames = legs.concat();
     let where_found = frames.iter().filter(|found| found.is_found());
     let farthest_m = where_found.clone().filter_map(|found| found.true_m);
     let missed = frames.iter().filter(|found| !found.is_found());
     let missed: Vec<String> = missed.map(ToString::to_string).collect();
-    let fast = found(shows::van_at(&chain(), 5.0, 70.0, SEED));
+    let fast = target_summaries(shows::van_at(&chain(), 5.0, 70.0, SEED));
     let mut rows = vec![
         claim.row("found", where_found.count() as f64 / frames.len() as f64).remark(format!(
             "{} frames, four from each of 22, 35, 50 and 72 m on; the van drives away at 2 m/s, which is chosen. {}",
@@ -238,19 +240,19 @@ pub(super) fn tracking_rows() -> Vec<Row> {
 }
 
 /// Claim 24: a pedestrian and a car in fog.
-pub(super) fn fog_rows() -> Vec<Row> {
+pub(super) fn fog_rows() -> Vec<ClaimRow> {
     let claim = claim(24);
     let lower = |mut show: Show| {
         show.settings.frame.scene.rig.waypoints = vec![[0.0, 0.0, LOWER_M, 0.0, 0.0].into()];
         show
     };
     let car = |visibility_m| lower(shows::car_in_fog(&chain(), visibility_m, SEED));
-    let cars: Vec<(f64, Vec<Found>)> = shows::CAR_VISIBILITIES_M
-        .map(|visibility_m| (visibility_m, found(car(visibility_m))))
+    let cars: Vec<(f64, Vec<TargetSummary>)> = shows::CAR_VISIBILITIES_M
+        .map(|visibility_m| (visibility_m, target_summaries(car(visibility_m))))
         .into();
     let seen = cars
         .iter()
-        .filter(|(_, frames)| frames.iter().all(Found::is_found));
+        .filter(|(_, frames)| frames.iter().all(TargetSummary::is_found));
     let least_m = seen.map(|(visibility_m, _)| *visibility_m);
     let places_m = cars[0].1.iter().filter_map(|found| found.true_m);
     let crossing = lower(shows::pedestrian_in_fog(&chain(), SEED));
@@ -259,7 +261,7 @@ pub(super) fn fog_rows() -> Vec<Row> {
     for part in people.filter(|object| object.name.starts_with("pedestrian")) {
         part.velocity_m_s = DVec3::new(0.0, 0.0, part.velocity_m_s.length());
     }
-    let in_window = |show: Show| share_in_window(&found(show));
+    let in_window = |show: Show| share_in_window(&target_summaries(show));
     let mut rows = vec![
         claim.row("least_visibility", least_m.fold(f64::INFINITY, f64::min)).remark(format!(
             "At {:.1} m; published: up to 60 m, without the fog's visibility. Fog is what one sees less than a kilometre through (WMO). 5 klux, car of 35 %.",
@@ -277,19 +279,19 @@ pub(super) fn fog_rows() -> Vec<Row> {
 }
 
 /// Claim 25: a figure behind a glass door.
-pub(super) fn glass_rows() -> Vec<Row> {
+pub(super) fn glass_rows() -> Vec<ClaimRow> {
     let claim = claim(25);
     let mut shows = shows::glass(&chain(), SEED);
     let mut show = shows.swap_remove(0);
     show.frames = 1;
-    let shown = run(show);
-    let outcome = |scheme: &str| -> &Outcome {
+    let shown = run_show(show);
+    let outcome = |scheme: &str| -> &SchemeOutcome {
         let mut schemes = shown.schemes.iter();
         let outcome = schemes.find(|outcome| outcome.scheme == scheme);
         outcome.expect("all schemes are compared")
     };
     let pixels = outcome("guided").found.seen_by;
-    let one = |found: &Found| share_right(std::slice::from_ref(found));
+    let one = |found: &TargetSummary| share_right(std::slice::from_ref(found));
     vec![
         claim
             .row("guided", one(&outcome("guided").found))
@@ -303,12 +305,12 @@ pub(super) fn glass_rows() -> Vec<Row> {
 }
 
 /// Claim 26: what throws a target out of its window.
-pub(super) fn motion_rows() -> Vec<Row> {
+pub(super) fn motion_rows() -> Vec<ClaimRow> {
     let claim = claim(26);
-    let slipped = found(shows::pedestrian(&chain(), -0.1, SEED));
-    let straight = found(shows::pedestrian(&chain(), 0.0, SEED));
-    let fast = found(shows::car(&chain(), 65.0, SEED));
-    let slow = found(shows::car(&chain(), 5.0, SEED));
+    let slipped = target_summaries(shows::pedestrian(&chain(), -0.1, SEED));
+    let straight = target_summaries(shows::pedestrian(&chain(), 0.0, SEED));
+    let fast = target_summaries(shows::car(&chain(), 65.0, SEED));
+    let slow = target_summaries(shows::car(&chain(), 5.0, SEED));
     vec![
         claim.row("slipped", share_right(&slipped)),
         claim.row("straight", share_right(&straight)),

@@ -1,6 +1,6 @@
 //! Claims 1, 12, 13, 16 and 28: design tables, memory and silicon, and the published sensors.
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::parameters::{
     HSLIDAR_BIN_M, ROUNDED_LIGHT_M_PER_S, TABLE_6_BACKGROUND_HZ, TABLE_6_BIN_M, TABLE_6_BIN_S,
     TABLE_6_CYCLES,
@@ -25,7 +25,7 @@ fn quantic(clk_mhz: f64, light_m_per_s: f64) -> Design {
 }
 
 /// Claim 1: Table 9 and the example at 384 MHz.
-pub(super) fn table_9_rows() -> Vec<Row> {
+pub(super) fn table_9_rows() -> Vec<ClaimRow> {
     let claim = claim(1);
     let of_clock = |mhz| {
         let design = quantic(mhz, ROUNDED_LIGHT_M_PER_S);
@@ -74,7 +74,7 @@ pub(super) fn full_histogram() -> Storage {
 }
 
 /// Claim 12: bins and bits of a full histogram.
-pub(super) fn size_rows() -> Vec<Row> {
+pub(super) fn size_rows() -> Vec<ClaimRow> {
     let claim = claim(12);
     let storage = full_histogram();
     let background = TABLE_6_BACKGROUND_HZ * TABLE_6_BIN_S * TABLE_6_CYCLES;
@@ -89,7 +89,7 @@ pub(super) fn size_rows() -> Vec<Row> {
 }
 
 /// Claim 13: process generations that the histograms fit.
-pub(super) fn silicon_rows() -> Vec<Row> {
+pub(super) fn silicon_rows() -> Vec<ClaimRow> {
     let claim = claim(13);
     let full = full_histogram();
     let reduced = Storage { bins: 16, ..full };
@@ -124,7 +124,7 @@ pub(super) fn table_39() -> Grid {
 }
 
 /// Claim 16: on-chip data of the demonstrator.
-pub(super) fn data_rows() -> Vec<Row> {
+pub(super) fn data_rows() -> Vec<ClaimRow> {
     let claim = claim(16);
     let bins = full_bins(75.0, HSLIDAR_BIN_M);
     let ratio = f64::from(bins) / 8.0;

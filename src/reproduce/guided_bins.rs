@@ -7,7 +7,7 @@
 //!                                        └─────────────────────────────────────────┘
 //! ```
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::parameters::HSLIDAR_BIN_M;
 use super::stereo::{DEPTHS_M, HSLIDAR_STEP_BINS, PAIR, THIRD_PX, wall_at};
 use super::thesis::{chart, claim};
@@ -110,7 +110,7 @@ fn least_bin_of_sensor_m(depth_m: f64, sensor: &SensorConfig, from_m: f64) -> f6
 }
 
 /// Claim 19: the smallest bins that a stereo guide allows.
-pub(super) fn bin_rows() -> Vec<Row> {
+pub(super) fn bin_rows() -> Vec<ClaimRow> {
     let claim = claim(19);
     let hslidar_sigma_m = 8.0 * HSLIDAR_BIN_M / 6.0;
     let reach = |sigma_m: f64| (sigma_m * PAIR.focal_px * PAIR.baseline_m / THIRD_PX).sqrt();

@@ -5,7 +5,7 @@
 //!   start values n and n + 1 ────► gates ─► LOCAL_STOP ─► the time between them           s
 //! ```
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::delay_line;
 use super::thesis::{claim, grid};
 use crate::chip::{Exposure, Probe, Sensor, SensorConfig, WindowLaw, hslidar, hslidar_delay_line};
@@ -84,7 +84,7 @@ struct Modes {
 
 impl Modes {
     fn measure() -> Self {
-        let of = |sensor: &Sensor| {
+        let intervals = |sensor: &Sensor| {
             let config = macropixel(sensor);
             let period = config.clock().period();
             (bin_interval(&config), window_step(&config), period)
@@ -95,14 +95,14 @@ impl Modes {
             ..SensorConfig::clone(&hslidar_delay_line())
         };
         Modes {
-            clocked: of(&hslidar()),
-            lines: of(&alike.into()),
+            clocked: intervals(&hslidar()),
+            lines: intervals(&alike.into()),
         }
     }
 }
 
 /// Claim 29: Table 10.
-pub(super) fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<ClaimRow> {
     let claim = claim(29);
     let Modes { clocked, lines } = Modes::measure();
     let over = |time: Time, unit: Time| time.as_s() / unit.as_s();

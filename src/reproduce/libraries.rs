@@ -61,27 +61,27 @@ fn column(file: &Path) -> Result<(String, [String; FIGURES.len()]), InputError> 
         liberty: file.to_owned(),
         ..SensorConfig::default()
     };
-    let library =
-        CellLibrary::of(&config).map_err(|(_, fault)| InputError::new("--liberty", fault))?;
-    let silicon = Silicon::of(&config);
-    let timing = MacropixelTiming::of(&config, &silicon, Limits::Kept, (0, 0));
+    let library = CellLibrary::from_config(&config)
+        .map_err(|(_, fault)| InputError::new("--liberty", fault))?;
+    let silicon = Silicon::new(&config);
+    let timing = MacropixelTiming::analyse(&config, &silicon, Limits::Kept, (0, 0));
     let below = timing.forbidden(0).0 - Time::from_ps(2);
     let any_phase = shortest_period(below, |p| phases(p).any(|phase| timing.works(p, phase)));
-    let load = LoadTiming::of(&config, &silicon, Limits::Kept).period();
+    let load = LoadTiming::analyse(&config, &silicon, Limits::Kept).period();
     let slow = SensorConfig {
         clk_hz: ENERGY_RUN.0,
         ..config.clone()
     };
     let exposure = Exposure::new(&slow, ENERGY_RUN.1, 2);
     let start = slow.largest_start() / 2 + 1;
-    let power = MacropixelPower::of(&slow, &exposure, start, &[], &Capacitances::default());
+    let power = MacropixelPower::simulate(&slow, &exposure, start, &[], &Capacitances::default());
     let ripple = timing.ripple.delay().as_ns();
     let reset_ps = (timing.reset_width() - timing.reset_need()).as_ns() * 1e3;
     let ns = |time: Option<Time>| time.map_or("none".to_owned(), |t| format!("{:.2}", t.as_ns()));
     let blocks = ["p_counter", "p_counter_timing"];
-    let share = |of: &dyn Fn(&str) -> f64| {
-        let whole: f64 = of("macropixel");
-        100.0 * blocks.iter().map(|block| of(block)).sum::<f64>() / whole
+    let share = |block_value: &dyn Fn(&str) -> f64| {
+        let whole: f64 = block_value("macropixel");
+        100.0 * blocks.iter().map(|block| block_value(block)).sum::<f64>() / whole
     };
     let (name, ratio, area, shares) = match library.from_file() {
         None => {
@@ -92,12 +92,13 @@ fn column(file: &Path) -> Result<(String, [String; FIGURES.len()]), InputError> 
         }
         Some(read) => {
             let ratio = read.liberty.area(CellKind::Dffsr) / read.liberty.area(CellKind::Dffr);
-            let of = |block: &str| {
+            let block_silicon = |block: &str| {
                 let mut blocks = power.silicon.iter();
                 blocks.find(|of| of.block == block).expect("a library's")
             };
-            let area = |block: &str| of(block).area;
-            let energy = |block: &str| of(block).internal_j + of(block).loads_j;
+            let area = |block: &str| block_silicon(block).area;
+            let energy =
+                |block: &str| block_silicon(block).internal_j + block_silicon(block).loads_j;
             let both = area(blocks[0]) + area(blocks[1]);
             let shares = [Some(share(&area)), Some(share(&energy))];
             (read.liberty.name.clone(), ratio, Some(both), shares)

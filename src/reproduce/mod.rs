@@ -38,12 +38,12 @@ mod stereo;
 mod system;
 mod thesis;
 
-pub use claim::{Claim, Row, Verdict, between_quotes, overall};
+pub use claim::{Claim, ClaimRow, Verdict, between_quotes, overall};
 pub use libraries::libraries;
 pub(crate) use page::heading;
 pub use page::{SLIPS_TITLE, grid, html, markdown, slips as slips_grid, tally};
 pub use published::Published;
-pub use registry::{CLAIMS, FIGURES, Listed, MEASUREMENTS, TABLES};
+pub use registry::{CLAIMS, FIGURES, MEASUREMENTS, NumberedItem, TABLES};
 pub use report::{ClaimResult, Report, reproduce};
 pub use selection::{NothingThere, Part, Selection};
 pub use thesis::Slip;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::claim::{Row, Verdict, figure, overall};
-use super::measured::Study;
-use super::registry::Listed;
+use super::claim::{ClaimRow, Verdict, figure, overall};
+use super::measured::MeasuredStudy;
+use super::registry::NumberedItem;
 use super::report::Report;
 use super::thesis::Slip;
 use crate::report::Grid;
@@ -21,7 +21,7 @@ const HEADINGS: [&str; 7] = [
 ];
 
 /// A row as text, by [`HEADINGS`].
-fn cells(row: &Row) -> [String; 7] {
+fn cells(row: &ClaimRow) -> [String; 7] {
     let difference = match row.difference() {
         Some((0.0, _)) => "0".into(),
         Some((absolute, _)) if !absolute.is_finite() => String::new(),
@@ -42,7 +42,7 @@ fn cells(row: &Row) -> [String; 7] {
 }
 
 /// A claim's rows as a table.
-pub fn grid(rows: &[Row]) -> Grid {
+pub fn grid(rows: &[ClaimRow]) -> Grid {
     let mut grid = Grid::new(HEADINGS);
     rows.iter().for_each(|row| grid.push(cells(row)));
     grid
@@ -50,19 +50,19 @@ pub fn grid(rows: &[Row]) -> Grid {
 
 /// How many rows of the report have each verdict, and how many claims.
 pub fn tally(report: &Report) -> String {
-    let row_verdicts: Vec<Verdict> = report.rows().map(Row::verdict).collect();
+    let row_verdicts: Vec<Verdict> = report.rows().map(ClaimRow::verdict).collect();
     let claim_verdicts: Vec<Verdict> = report.claims.iter().map(|c| overall(&c.rows)).collect();
     format!(
         "Of {} claims: {}.\nOf {} rows: {}.",
         claim_verdicts.len(),
-        counted(&claim_verdicts).join(", "),
+        verdict_counts(&claim_verdicts).join(", "),
         row_verdicts.len(),
-        counted(&row_verdicts).join(", "),
+        verdict_counts(&row_verdicts).join(", "),
     )
 }
 
 /// "80 agree", "5 differ" and so on, of every verdict.
-fn counted(verdicts: &[Verdict]) -> [String; Verdict::ALL.len()] {
+fn verdict_counts(verdicts: &[Verdict]) -> [String; Verdict::ALL.len()] {
     Verdict::ALL.map(|verdict| {
         let count = verdicts.iter().filter(|&&v| v == verdict).count();
         format!("{count} {}", plural(verdict))
@@ -70,7 +70,7 @@ fn counted(verdicts: &[Verdict]) -> [String; Verdict::ALL.len()] {
 }
 
 /// How many of a claim's published rows agree, for example "3 of 5".
-fn agreeing(rows: &[Row]) -> String {
+fn agreeing(rows: &[ClaimRow]) -> String {
     let published = rows.iter().filter(|r| r.verdict() != Verdict::Ours);
     let agree = rows.iter().filter(|r| r.verdict() == Verdict::Agrees);
     format!("{} of {}", agree.count(), published.count())
@@ -132,7 +132,7 @@ pub fn markdown(report: &Report) -> String {
         let slips = slips(&report.slips).markdown();
         let _ = writeln!(out, "## {SLIPS_TITLE}\n\n{slips}");
     }
-    for Listed { number, title, it } in &report.tables {
+    for NumberedItem { number, title, it } in &report.tables {
         let _ = writeln!(out, "## Table {number}: {title}\n\n{}", it.markdown());
     }
     for result in &report.figures {
@@ -164,7 +164,7 @@ pub fn slips(slips: &[Slip]) -> Grid {
 }
 
 /// What stands above a measurement.
-pub(crate) fn heading(result: &Listed<Study>) -> String {
+pub(crate) fn heading(result: &NumberedItem<MeasuredStudy>) -> String {
     format!(
         "The chip against its theory {}: {}",
         result.number, result.title
@@ -204,7 +204,7 @@ pub fn html(report: &Report) -> String {
             grid_html(&slips(&report.slips))
         );
     }
-    for Listed { number, title, it } in &report.tables {
+    for NumberedItem { number, title, it } in &report.tables {
         let _ = writeln!(
             body,
             "<section id=t{number}><h2>Table {number}: {}</h2>\n{}</section>",
@@ -212,7 +212,7 @@ pub fn html(report: &Report) -> String {
             grid_html(it)
         );
     }
-    for Listed { number, title, it } in &report.figures {
+    for NumberedItem { number, title, it } in &report.figures {
         let _ = writeln!(
             body,
             "<section id=f{number}><h2>Fig. {number}: {}</h2>\n<figure>{}</figure>\n</section>",
@@ -281,9 +281,9 @@ fn glance(report: &Report) -> String {
 
 fn tallies(report: &Report) -> String {
     let claims: Vec<Verdict> = report.claims.iter().map(|c| overall(&c.rows)).collect();
-    let rows: Vec<Verdict> = report.rows().map(Row::verdict).collect();
+    let rows: Vec<Verdict> = report.rows().map(ClaimRow::verdict).collect();
     let badges = |verdicts: &[Verdict]| {
-        let badges = counted(verdicts).into_iter().zip(Verdict::ALL);
+        let badges = verdict_counts(verdicts).into_iter().zip(Verdict::ALL);
         let badges =
             badges.map(|(text, v)| format!("<span class='badge {}'>{text}</span> ", class(v)));
         badges.collect::<String>()
@@ -297,7 +297,7 @@ fn tallies(report: &Report) -> String {
     )
 }
 
-fn claim_table(rows: &[Row]) -> String {
+fn claim_table(rows: &[ClaimRow]) -> String {
     let mut out = String::from("<table>\n<tr>");
     for heading in HEADINGS.iter().take(6) {
         let _ = write!(out, "<th>{heading}</th>");
@@ -331,7 +331,7 @@ fn claim_table(rows: &[Row]) -> String {
 
 /// Where the computed value lies in the published range: a band for the tolerance, a dot for ours. The picture spans
 /// three tolerances either way; what is farther off is drawn at its edge.
-fn gauge(row: &Row) -> String {
+fn gauge(row: &ClaimRow) -> String {
     let (Some(computed), Some((low, high))) = (row.computed, row.published.range()) else {
         return String::new();
     };

@@ -1,8 +1,8 @@
 //! The systems that the thesis reckons with, in its numbers: Table 6's and the demonstrator's (Table 15).
 
 use crate::scene::{Lidar, Scene};
-use crate::theory::detection::{Model, Ties};
-use crate::theory::partial::{Goal, Link, Models, System};
+use crate::theory::detection::{DetectionModel, Ties};
+use crate::theory::partial::{Link, Models, RangingGoal, System};
 use crate::theory::precision;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -26,7 +26,7 @@ pub(super) fn sigma_over_fwhm() -> f64 {
 }
 
 /// Eq. 17 as one peak finder sees it: every photon counted, ties by lot.
-const EVERY_PHOTON: Model = Model::Poisson(Ties::Random);
+const EVERY_PHOTON: DetectionModel = DetectionModel::Poisson(Ties::Random);
 
 /// Table 6's system with 16 bins (Table 7).
 pub(super) fn long_range() -> System {
@@ -36,7 +36,7 @@ pub(super) fn long_range() -> System {
             background_hz: TABLE_6_BACKGROUND_HZ,
             pulse_sigma_s: 8e-9 * sigma_over_fwhm(),
         },
-        goal: Goal {
+        goal: RangingGoal {
             precision_m: 0.1,
             detection: 0.997,
         },
@@ -66,7 +66,7 @@ pub(super) fn demonstrator() -> System {
         background_hz: 8e6,
         pulse_sigma_s: 4.5e-9 * sigma_over_fwhm(),
     };
-    let goal = Goal {
+    let goal = RangingGoal {
         precision_m: 0.1,
         detection: 0.997,
     };

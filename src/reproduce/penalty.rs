@@ -1,6 +1,6 @@
 //! Claims 11, 14 and 15: laser cycles, and what zooming and sliding add to them.
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::measured::partial::{
     AtRange, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip, with_interval,
 };
@@ -9,7 +9,7 @@ use super::parameters::{
     long_range, sigma_over_fwhm,
 };
 use super::thesis::{ClaimText, claim};
-use crate::theory::detection::{Model, Ties};
+use crate::theory::detection::{DetectionModel, Ties};
 use crate::theory::partial::{Cost, Models, System};
 use crate::theory::precision;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -17,7 +17,7 @@ use crate::units::SPEED_OF_LIGHT_M_PER_S;
 pub(super) mod charts;
 
 /// As this chip counts: one hit per bin and cycle.
-const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
+const ONE_HIT: DetectionModel = DetectionModel::Bernoulli(Ties::Random);
 
 /// The same system, counting as this chip does in its detection steps.
 fn one_hit(system: System) -> System {
@@ -54,7 +54,7 @@ fn sigma_for(cycles: f64) -> f64 {
 }
 
 /// Claim 11: laser cycles at 200 m.
-pub(super) fn cycles_rows() -> Vec<Row> {
+pub(super) fn cycles_rows() -> Vec<ClaimRow> {
     let claim = claim(11);
     let system = long_range();
     let needed = system.measure(200.0).laser_cycles;
@@ -84,13 +84,13 @@ pub(super) fn cycles_rows() -> Vec<Row> {
 }
 
 /// Claim 14: penalties of Table 7's configurations at 200 m.
-pub(super) fn long_range_rows() -> Vec<Row> {
+pub(super) fn long_range_rows() -> Vec<ClaimRow> {
     let claim = claim(14);
     let system = long_range();
     let full = system.full(200.0);
     let (zooming, sliding) = (system.zooming(200.0), system.sliding(200.0, 0));
     let chip = one_hit(system).zooming(200.0);
-    let on_chip = long_range_on_chip().at(200.0);
+    let on_chip = long_range_on_chip().result(200.0);
     let measured = on_chip.penalty_of_sliding();
     let mut rows = vec![
         claim
@@ -121,7 +121,7 @@ pub(super) fn long_range_rows() -> Vec<Row> {
 }
 
 /// The measured penalty of zooming.
-fn zooming_row(claim: &'static ClaimText, at: &AtRange) -> Row {
+fn zooming_row(claim: &'static ClaimText, at: &AtRange) -> ClaimRow {
     let name = format!("zooming_measured_{}", at.range_m);
     let penalty = at.penalty_of_zooming();
     let text = penalty.map_or("never".to_owned(), |p| with_interval(&p, 2));
@@ -135,7 +135,7 @@ fn zooming_row(claim: &'static ClaimText, at: &AtRange) -> Row {
 }
 
 /// What the chip finds in as many laser cycles as zooming's coarsest detection is reckoned to take, and what its counters do.
-fn detection_rows(claim: &'static ClaimText, at: &AtRange) -> Vec<Row> {
+fn detection_rows(claim: &'static ClaimText, at: &AtRange) -> Vec<ClaimRow> {
     let Some(coarsest) = at.detections.first() else {
         return Vec::new();
     };
@@ -160,7 +160,7 @@ fn detection_rows(claim: &'static ClaimText, at: &AtRange) -> Vec<Row> {
 }
 
 /// Sliding in the bins that the demonstrator had, and why zooming is not beside it.
-fn delay_line_rows() -> Vec<Row> {
+fn delay_line_rows() -> Vec<ClaimRow> {
     let claim = claim(15);
     let lines = demonstrator_on_delay_lines();
     let (sliding, penalty) = (lines.sliding(), lines.penalty_of_sliding());
@@ -203,7 +203,7 @@ fn zooming_takes(system: &System, steps: usize) -> f64 {
 }
 
 /// Claim 15: penalties of the demonstrator at 75 m.
-pub(super) fn demonstrator_rows() -> Vec<Row> {
+pub(super) fn demonstrator_rows() -> Vec<ClaimRow> {
     let claim = claim(15);
     let system = demonstrator();
     let full = system.full(75.0);
@@ -215,8 +215,8 @@ pub(super) fn demonstrator_rows() -> Vec<Row> {
     let coarse_m = f64::from(system.bins) * system.window_m;
     let coarse_ns = 2e9 * coarse_m / SPEED_OF_LIGHT_M_PER_S;
     let (at_75, at_74) = (
-        demonstrator_on_chip().at(75.0),
-        demonstrator_on_chip().at(74.0),
+        demonstrator_on_chip().result(75.0),
+        demonstrator_on_chip().result(74.0),
     );
     let sliding_75 = at_75.penalty_of_sliding();
     let sliding_74 = at_74.penalty_of_sliding();

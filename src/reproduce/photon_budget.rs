@@ -2,15 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::parameters;
 use super::thesis::{chart, claim};
 use crate::photon::solar::{FULL_SUN_KLUX, band_irradiance};
 use crate::photon::{
-    Convention, Filter, FilterShape, LaserDrift, PhotonBudget, Poisson, Purpose, random_stream,
+    Convention, Filter, FilterShape, LaserDrift, PhotonBudget, Poisson, RandomPurpose,
+    random_stream,
 };
 use crate::report::Chart;
-use crate::theory::detection::{self, Model, PerCycle, Ties};
+use crate::theory::detection::{self, DetectionModel, PerCycle, Ties};
 
 /// Table 6's system in either convention.
 fn table_6(convention: Convention) -> PhotonBudget {
@@ -24,7 +25,7 @@ fn table_6(convention: Convention) -> PhotonBudget {
 const REFLECTIVITY: f64 = 0.1;
 
 /// Claim 7: signal photons.
-pub(super) fn signal_rows() -> Vec<Row> {
+pub(super) fn signal_rows() -> Vec<ClaimRow> {
     let claim = claim(7);
     let thesis = table_6(Convention::Thesis);
     let at_200 = thesis.signal_per_pulse_far_field(200.0, REFLECTIVITY);
@@ -39,7 +40,7 @@ pub(super) fn signal_rows() -> Vec<Row> {
 }
 
 /// Claim 8: sunlight.
-pub(super) fn background_rows() -> Vec<Row> {
+pub(super) fn background_rows() -> Vec<ClaimRow> {
     let claim = claim(8);
     let filter = Filter::new(905.0, 20.0, FilterShape::TopHat);
     let irradiance = band_irradiance(&filter);
@@ -53,7 +54,7 @@ pub(super) fn background_rows() -> Vec<Row> {
 }
 
 /// Claim 21: the demonstrator's measured light.
-pub(super) fn demonstrator_rows() -> Vec<Row> {
+pub(super) fn demonstrator_rows() -> Vec<ClaimRow> {
     let claim = claim(21);
     let scaled = parameters::demonstrator_light(100.0) / 1e6;
     vec![
@@ -90,7 +91,7 @@ fn monte_carlo(bins: u32, cycles: u64) -> f64 {
     let n = cycles as f64;
     let background = Poisson::new(n * light.background);
     let signal = Poisson::new(n * (light.signal + light.background));
-    let mut random = random_stream(32, Purpose::Photons, bins, cycles as u32);
+    let mut random = random_stream(32, RandomPurpose::Photons, bins, cycles as u32);
     let mut won = 0.0;
     for _ in 0..RUNS {
         let own = signal.draw(&mut random);
@@ -104,19 +105,19 @@ fn monte_carlo(bins: u32, cycles: u64) -> f64 {
     won / f64::from(RUNS)
 }
 
-fn formula(bins: u32, cycles: u64, model: Model) -> f64 {
+fn formula(bins: u32, cycles: u64, model: DetectionModel) -> f64 {
     detection::probability(&fig_32_light(bins), cycles, model).probability
 }
 
 /// Claim 9: P_D against Monte Carlo.
-pub(super) fn detection_rows() -> Vec<Row> {
+pub(super) fn detection_rows() -> Vec<ClaimRow> {
     let claim = claim(9);
     let points: Vec<(u32, u64)> = FIG_32_BINS
         .into_iter()
         .flat_map(|bins| fig_32_cycles().map(|cycles| (bins, cycles)))
         .collect();
     let simulated: Vec<f64> = points.par_iter().map(|&(b, n)| monte_carlo(b, n)).collect();
-    let worst = |model: Model, from: u64, error: &dyn Fn(f64, f64) -> f64| {
+    let worst = |model: DetectionModel, from: u64, error: &dyn Fn(f64, f64) -> f64| {
         let pairs = points
             .iter()
             .zip(&simulated)
@@ -132,21 +133,30 @@ pub(super) fn detection_rows() -> Vec<Row> {
         (found - p).abs() / sigma
     };
     let absolute = |p: f64, found: f64| (found - p).abs();
-    let lot = Model::Poisson(Ties::Random);
-    let printed = worst(Model::GaussianAsPrinted, 100, &absolute);
+    let lot = DetectionModel::Poisson(Ties::Random);
+    let printed = worst(DetectionModel::GaussianAsPrinted, 100, &absolute);
     vec![
         claim.row("poisson", worst(lot, 1, &in_sigmas)),
-        claim.row("gaussian", worst(Model::Gaussian, 100, &absolute)),
+        claim.row("gaussian", worst(DetectionModel::Gaussian, 100, &absolute)),
         claim.row("as_printed", printed),
         claim.row(
             "no_counts",
             detection::poisson(1e-9, 1e-9, 8, Ties::Random).probability,
         ),
         claim.row("one_cycle", formula(8, 1, lot)),
-        claim.row("ties_lost", formula(8, 1, Model::Poisson(Ties::Strict))),
-        claim.row("ties_won", formula(8, 1, Model::Poisson(Ties::Loose))),
+        claim.row(
+            "ties_lost",
+            formula(8, 1, DetectionModel::Poisson(Ties::Strict)),
+        ),
+        claim.row(
+            "ties_won",
+            formula(8, 1, DetectionModel::Poisson(Ties::Loose)),
+        ),
         claim.row("thousand_cycles", formula(2, 1000, lot)),
-        claim.row("one_hit", formula(2, 1000, Model::Bernoulli(Ties::Random))),
+        claim.row(
+            "one_hit",
+            formula(2, 1000, DetectionModel::Bernoulli(Ties::Random)),
+        ),
     ]
 }
 
@@ -155,13 +165,19 @@ pub(super) fn figure_32() -> Chart {
     let mut chart = chart(32);
     for bins in FIG_32_BINS {
         let line = (0..=60).map(|i| libm::pow(1000f64, f64::from(i) / 60.0).round() as u64);
-        let exact = line.map(|n| (n as f64, formula(bins, n, Model::Poisson(Ties::Random))));
+        let exact = line.map(|n| {
+            (
+                n as f64,
+                formula(bins, n, DetectionModel::Poisson(Ties::Random)),
+            )
+        });
         let runs = fig_32_cycles().map(|n| (n as f64, monte_carlo(bins, n)));
         chart = chart
             .line(format!("Eq. 17, Poisson, M = {bins}"), exact)
             .points(format!("Monte Carlo, M = {bins}"), runs);
     }
-    let printed = fig_32_cycles().map(|n| (n as f64, formula(8, n, Model::GaussianAsPrinted)));
+    let printed =
+        fig_32_cycles().map(|n| (n as f64, formula(8, n, DetectionModel::GaussianAsPrinted)));
     chart.dashed("Eq. 18–19 as printed, M = 8", printed)
 }
 

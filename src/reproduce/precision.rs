@@ -1,6 +1,6 @@
 //! Claim 10: Thompson against the Cramér-Rao bound.
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::thesis::{chart, claim};
 use crate::report::Chart;
 use crate::theory::precision::{cramer_rao, thompson, thompson_best_ratio};
@@ -31,9 +31,9 @@ fn thompson_ns(signal: f64) -> f64 {
 const KNOWN_BOUNDS_NS: [(f64, f64); 3] = [(100.0, 0.536543), (1e3, 0.075241), (1e5, 0.004929)];
 
 /// Claim 10.
-pub(super) fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<ClaimRow> {
     let claim = claim(10);
-    let mut rows: Vec<Row> = KNOWN_BOUNDS_NS
+    let mut rows: Vec<ClaimRow> = KNOWN_BOUNDS_NS
         .into_iter()
         .map(|(signal, reference_ns)| {
             let bound_ns = bound_ns(signal);

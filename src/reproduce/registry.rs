@@ -3,7 +3,7 @@
 
 use std::sync::LazyLock;
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::thesis::THESIS;
 use super::{
     chip, delay_line, demonstrator, design, guided_bins, hslidar_modes, measured, penalty,
@@ -14,7 +14,7 @@ use crate::report::{Chart, Grid};
 
 /// Something under a number and a title: what makes it, or what was made.
 #[derive(Debug, Clone, Copy)]
-pub struct Listed<T> {
+pub struct NumberedItem<T> {
     /// Its number, in the thesis but for measurements.
     pub number: u32,
     /// What it shows.
@@ -24,48 +24,48 @@ pub struct Listed<T> {
 }
 
 /// Computes the rows of a claim.
-pub(super) type Rows = fn() -> Vec<Row>;
+pub(super) type Rows = fn() -> Vec<ClaimRow>;
 /// Makes a table.
 pub(super) type Tabulate = fn() -> Grid;
 /// Draws a figure.
 pub(super) type Draw = fn() -> Chart;
 /// Measures; the argument is the number of frames behind each figure.
-pub(super) type Measure = fn(usize) -> Result<measured::Study, EngineError>;
+pub(super) type Measure = fn(usize) -> Result<measured::MeasuredStudy, EngineError>;
 
 /// Pairs titles with what makes them, which must have the same numbers in the same order.
 fn listed<F: Copy>(
     titles: impl ExactSizeIterator<Item = (u32, &'static str)>,
     makers: &[(u32, F)],
-) -> Vec<Listed<F>> {
+) -> Vec<NumberedItem<F>> {
     assert_eq!(titles.len(), makers.len(), "thesis.toml has as many");
     let pairs = titles.zip(makers);
     let pair = |((number, title), &(made, it))| {
         assert_eq!(number, made, "thesis.toml has the same order");
-        Listed { number, title, it }
+        NumberedItem { number, title, it }
     };
     pairs.map(pair).collect()
 }
 
 /// Every claim, by number.
-pub static CLAIMS: LazyLock<Vec<Listed<Rows>>> = LazyLock::new(|| {
+pub static CLAIMS: LazyLock<Vec<NumberedItem<Rows>>> = LazyLock::new(|| {
     let titles = THESIS.claims.iter().map(|c| (c.number, &*c.title));
     listed(titles, &CLAIM_ROWS)
 });
 
 /// Every table, by number.
-pub static TABLES: LazyLock<Vec<Listed<Tabulate>>> = LazyLock::new(|| {
+pub static TABLES: LazyLock<Vec<NumberedItem<Tabulate>>> = LazyLock::new(|| {
     let titles = THESIS.tables.iter().map(|t| (t.number, &*t.title));
     listed(titles, &TABLE_GRIDS)
 });
 
 /// Every figure, by number.
-pub static FIGURES: LazyLock<Vec<Listed<Draw>>> = LazyLock::new(|| {
+pub static FIGURES: LazyLock<Vec<NumberedItem<Draw>>> = LazyLock::new(|| {
     let titles = THESIS.figures.iter().map(|f| (f.number, &*f.title));
     listed(titles, &FIGURE_CHARTS)
 });
 
 /// Every measurement, by number.
-pub static MEASUREMENTS: LazyLock<Vec<Listed<Measure>>> = LazyLock::new(|| {
+pub static MEASUREMENTS: LazyLock<Vec<NumberedItem<Measure>>> = LazyLock::new(|| {
     let titles = THESIS.measurements.iter().map(|m| (m.number, &*m.title));
     listed(titles, &STUDIES)
 });

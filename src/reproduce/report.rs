@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::claim::{Claim, Row, Verdict, overall};
+use super::claim::{Claim, ClaimRow, Verdict, overall};
 use super::measured;
-use super::registry::{self, CLAIMS, FIGURES, Listed, MEASUREMENTS, TABLES};
+use super::registry::{self, CLAIMS, FIGURES, MEASUREMENTS, NumberedItem, TABLES};
 use super::selection::Selection;
 use super::thesis::{self, Slip, THESIS};
 use crate::report::{Chart, Grid};
@@ -15,17 +15,17 @@ pub struct ClaimResult {
     /// The claim.
     pub claim: Claim,
     /// Its comparisons.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ClaimRow>,
 }
 
-impl Listed<Chart> {
+impl NumberedItem<Chart> {
     /// The file's name without extension.
     pub(crate) fn file(&self) -> String {
         format!("fig_{:03}", self.number)
     }
 }
 
-impl Listed<measured::Study> {
+impl NumberedItem<measured::MeasuredStudy> {
     /// File names without extension, each with its table.
     pub(crate) fn tables(&self) -> impl Iterator<Item = (String, &'static str, &Grid)> {
         let lettered = self.it.grids.iter().zip('a'..);
@@ -49,19 +49,19 @@ pub struct Report {
     /// The thesis's slips, where every claim is chosen.
     pub slips: Vec<Slip>,
     /// Tables.
-    pub tables: Vec<Listed<Grid>>,
+    pub tables: Vec<NumberedItem<Grid>>,
     /// Figures.
-    pub figures: Vec<Listed<Chart>>,
+    pub figures: Vec<NumberedItem<Chart>>,
     /// Measurements of the chip.
-    pub measurements: Vec<Listed<measured::Study>>,
+    pub measurements: Vec<NumberedItem<measured::MeasuredStudy>>,
 }
 
 /// Computes what is chosen, on all threads; `done` is told of each claim, table, figure and measurement as it is finished.
 pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
     let frames = selection.frames.unwrap_or(measured::FRAMES);
     let claims = || {
-        let made = made(&CLAIMS, &selection.claims, &done, |rows| rows());
-        let made = made.into_iter().map(|Listed { number, title, it }| {
+        let made = make_numbered(&CLAIMS, &selection.claims, &done, |rows| rows());
+        let made = made.into_iter().map(|NumberedItem { number, title, it }| {
             let text = thesis::claim(number);
             debug_assert!(
                 it.len() >= text.rows.len(),
@@ -76,10 +76,10 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
         });
         made.collect::<Vec<_>>()
     };
-    let tables = || made(&TABLES, &selection.tables, &done, |grid| grid());
-    let figures = || made(&FIGURES, &selection.figures, &done, |chart| chart());
+    let tables = || make_numbered(&TABLES, &selection.tables, &done, |grid| grid());
+    let figures = || make_numbered(&FIGURES, &selection.figures, &done, |chart| chart());
     let study = |measure: registry::Measure| measure(frames).expect("what the engines run");
-    let measurements = || made(&MEASUREMENTS, &selection.measurements, &done, study);
+    let measurements = || make_numbered(&MEASUREMENTS, &selection.measurements, &done, study);
     let ((claims, tables), (figures, measurements)) = rayon::join(
         || rayon::join(claims, tables),
         || rayon::join(figures, measurements),
@@ -99,18 +99,18 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
 }
 
 /// Makes those of these numbers, each by itself, in the order of `all`.
-fn made<F: Copy + Sync, T: Send>(
-    all: &[Listed<F>],
+fn make_numbered<F: Copy + Sync, T: Send>(
+    all: &[NumberedItem<F>],
     numbers: &[u32],
     done: &(impl Fn() + Sync),
     make: impl Fn(F) -> T + Sync,
-) -> Vec<Listed<T>> {
+) -> Vec<NumberedItem<T>> {
     let chosen = all.iter().filter(|listed| numbers.contains(&listed.number));
-    let chosen: Vec<&Listed<F>> = chosen.collect();
+    let chosen: Vec<&NumberedItem<F>> = chosen.collect();
     let made = chosen.into_par_iter().with_max_len(1).map(|listed| {
         let it = make(listed.it);
         done();
-        Listed {
+        NumberedItem {
             number: listed.number,
             title: listed.title,
             it,
@@ -121,12 +121,12 @@ fn made<F: Copy + Sync, T: Send>(
 
 impl Report {
     /// The rows of all claims.
-    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+    pub fn rows(&self) -> impl Iterator<Item = &ClaimRow> {
         self.claims.iter().flat_map(|result| &result.rows)
     }
 
     /// Rows that leave their tolerance although they are expected to hold, with the number of their claim.
-    pub fn failures(&self) -> Vec<(u32, &Row)> {
+    pub fn failures(&self) -> Vec<(u32, &ClaimRow)> {
         let rows = self
             .claims
             .iter()
@@ -137,7 +137,7 @@ impl Report {
 
     /// Everything for a machine to read. Numbers that are not finite become null.
     pub fn json(&self) -> Value {
-        let row = |row: &Row| {
+        let row = |row: &ClaimRow| {
             let range = row.published.range();
             json!({
                 "quantity": row.what,
@@ -162,19 +162,19 @@ impl Report {
                 "rows": result.rows.iter().map(row).collect::<Vec<_>>(),
             })
         };
-        let table = |table: &Listed<Grid>| json!({"table": table.number, "title": table.title, "rows": table.it.lines().collect::<Vec<_>>()});
+        let table = |table: &NumberedItem<Grid>| json!({"table": table.number, "title": table.title, "rows": table.it.lines().collect::<Vec<_>>()});
         let series = |chart: &Chart| {
             let series = chart.series.iter();
             series
                 .map(|s| json!({"name": s.name, "points": s.points}))
                 .collect::<Vec<_>>()
         };
-        let figure = |figure: &Listed<Chart>| {
+        let figure = |figure: &NumberedItem<Chart>| {
             let chart = &figure.it;
             let chart = json!({"title": chart.title, "x": chart.x.label, "y": chart.y.label, "series": series(chart)});
             json!({"figure": figure.number, "title": figure.title, "charts": [chart]})
         };
-        let measurement = |result: &Listed<measured::Study>| {
+        let measurement = |result: &NumberedItem<measured::MeasuredStudy>| {
             let tables = result.tables().map(|(_, title, grid)| {
                 json!({"title": title, "rows": grid.lines().collect::<Vec<_>>()})
             });

@@ -1,13 +1,13 @@
 //! Claim 28: the published sensors of Tables 5 and 16, and what their partial histograms cost in one common light.
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::parameters::{HSLIDAR_BIN_M, demonstrator};
-use super::thesis::{Scheme, Sensor, THESIS, chart, claim, grid};
+use super::thesis::{PublishedSensor, Scheme, THESIS, chart, claim, grid};
 use crate::report::{Chart, Grid};
 use crate::theory::partial::{System, sliding_reduction, zooming_reduction};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-impl Sensor {
+impl PublishedSensor {
     /// Bins of the full histogram that it stands for.
     fn equivalent_bins(&self) -> Option<f64> {
         let bins = f64::from(self.bins?);
@@ -60,7 +60,7 @@ impl Sensor {
 }
 
 /// Claim 28: histogram reduction ratios, and the place of the demonstrator.
-pub(super) fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<ClaimRow> {
     let claim = claim(28);
     let inverse = |bins, steps| 1.0 / zooming_reduction(bins, steps);
     let widest = |stacked: bool| {

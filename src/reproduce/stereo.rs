@@ -1,6 +1,6 @@
 //! Claims 17, 18 and 26: the stereo pair of Table 12 as a guide.
 
-use super::claim::{Row, Verdict};
+use super::claim::{ClaimRow, Verdict};
 use super::demonstrator;
 use super::parameters::HSLIDAR_BIN_M;
 use super::thesis::{chart, claim};
@@ -80,7 +80,7 @@ fn rig_errors() -> Vec<(f64, f64)> {
 }
 
 /// Claim 17: error against distance, and the nearest distance.
-pub(super) fn error_rows() -> Vec<Row> {
+pub(super) fn error_rows() -> Vec<ClaimRow> {
     let claim = claim(17);
     let errors = rig_errors();
     let ratio = errors
@@ -102,7 +102,7 @@ pub(super) fn error_rows() -> Vec<Row> {
 }
 
 /// The limits of Table 12's pair, with pixels as they are and binned. Both are published of one rig.
-fn limit_rows() -> Vec<Row> {
+fn limit_rows() -> Vec<ClaimRow> {
     let claim = claim(17);
     let limits = [("unbinned", PAIR), ("binned", BINNED)].map(|(pixels, pair)| {
         [("nearest", 128.0), ("farthest", 10.0)].map(|(end, disparity_px)| {
@@ -110,7 +110,7 @@ fn limit_rows() -> Vec<Row> {
             claim.row(&name, pair.depth_m(disparity_px))
         })
     });
-    let meet = |rig: &&[Row; 2]| rig.iter().all(|row| row.verdict() == Verdict::Agrees);
+    let meet = |rig: &&[ClaimRow; 2]| rig.iter().all(|row| row.verdict() == Verdict::Agrees);
     let both = limits.iter().filter(meet).count() as f64;
     // Distance times disparity is constant, so 200 m at 10 px give the least distance, at 128 px.
     let least_nearest_m = 200.0 * 10.0 / 128.0;
@@ -242,7 +242,7 @@ pub(super) fn figure_68() -> Chart {
 }
 
 /// Claim 18: a yaw of 0.1° at 40 m.
-pub(super) fn yaw_rows() -> Vec<Row> {
+pub(super) fn yaw_rows() -> Vec<ClaimRow> {
     let claim = claim(18);
     let depth_m = 40.0;
     let mut scene = wall_at(depth_m);
@@ -288,7 +288,7 @@ pub(super) fn figure_70() -> Chart {
 }
 
 /// Claim 26: what throws a target out of its window.
-pub(super) fn motion_rows() -> Vec<Row> {
+pub(super) fn motion_rows() -> Vec<ClaimRow> {
     let claim = claim(26);
     let window_m = 8.0 * HSLIDAR_BIN_M;
     let metres_per_mile = 1609.344;

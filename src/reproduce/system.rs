@@ -1,14 +1,14 @@
 //! Claims 22 to 24 and 27: what formulas and budgets say of the demonstrator of chapter 6, beside what the chain gives
 //! ([`mod@demonstrator`]).
 
-use super::claim::Row;
+use super::claim::ClaimRow;
 use super::demonstrator::{self, swept};
 use super::parameters::{HSLIDAR_BIN_M, demonstrator_photons};
 use super::thesis::{chart, claim};
 use crate::chip::hslidar_delay_line;
 use crate::photon::Atmosphere;
 use crate::report::Chart;
-use crate::theory::detection::{self, Model, PerCycle, Ties};
+use crate::theory::detection::{self, DetectionModel, PerCycle, Ties};
 use crate::theory::precision::cramer_rao;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -36,7 +36,7 @@ fn bound_m(range_m: f64, klux: f64) -> f64 {
 }
 
 /// Claim 22: errors to 50 m.
-pub(super) fn error_rows() -> Vec<Row> {
+pub(super) fn error_rows() -> Vec<ClaimRow> {
     let claim = claim(22);
     let mut rows = demonstrator::error_rows();
     rows.extend(demonstrator::sigma_rows(bound_m(50.0, 72.0)));
@@ -59,7 +59,7 @@ pub(super) fn figure_104() -> Chart {
 }
 
 /// Claim 23: a van is followed, in windows that overlap enough.
-pub(super) fn tracking_rows() -> Vec<Row> {
+pub(super) fn tracking_rows() -> Vec<ClaimRow> {
     let claim = claim(23);
     let window_m = 8.0 * HSLIDAR_BIN_M;
     let step_m = metres(STEP_S);
@@ -87,7 +87,7 @@ fn detection_at(range_m: f64, klux: f64, factor: f64) -> f64 {
         bins: system.bins,
     };
     let cycles = (LASER_HZ * EXPOSURE_S) as u64;
-    detection::probability(&light, cycles, Model::Bernoulli(Ties::Random)).probability
+    detection::probability(&light, cycles, DetectionModel::Bernoulli(Ties::Random)).probability
 }
 
 /// Least visibility in which a target of 10 % at `range_m` is found with 99.7 %, m.
@@ -109,7 +109,7 @@ fn least_visibility_m(range_m: f64, klux: f64) -> f64 {
 }
 
 /// Claim 24: fog.
-pub(super) fn fog_rows() -> Vec<Row> {
+pub(super) fn fog_rows() -> Vec<ClaimRow> {
     let claim = claim(24);
     let mut rows = demonstrator::fog_rows();
     rows.push(claim.row(
@@ -120,7 +120,7 @@ pub(super) fn fog_rows() -> Vec<Row> {
 }
 
 /// Claim 27: the time of a frame.
-pub(super) fn frame_rows() -> Vec<Row> {
+pub(super) fn frame_rows() -> Vec<ClaimRow> {
     let claim = claim(27);
     let hslidar = hslidar_delay_line();
     let load_ms = hslidar.load_time().as_s() * 1e3;

@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::claim::Row;
-use super::measured::Study;
+use super::claim::ClaimRow;
+use super::measured::MeasuredStudy;
 use super::published::Published;
 use crate::numerics::intervals::Estimate;
 use crate::report::{Chart, Grid};
@@ -26,7 +26,7 @@ pub(super) struct Thesis {
     pub figures: Vec<FigureText>,
     pub measurements: Vec<MeasurementText>,
     pub slips: Vec<Slip>,
-    pub sensors: Vec<Sensor>,
+    pub sensors: Vec<PublishedSensor>,
 }
 
 #[derive(Deserialize)]
@@ -106,7 +106,7 @@ pub(super) enum Scheme {
 /// A line of Tables 5 and 16.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Sensor {
+pub(super) struct PublishedSensor {
     pub author: String,
     pub year: u32,
     /// Rows and columns of ToF pixels.
@@ -197,7 +197,7 @@ impl MeasurementText {
         numbers: &[(&str, usize)],
         grids: [Grid; 2],
         chart: Option<Chart>,
-    ) -> Study {
+    ) -> MeasuredStudy {
         let note = |note: &String| {
             let fill = |text: String, (name, number): &(&str, usize)| {
                 text.replace(&format!("{{{name}}}"), &number.to_string())
@@ -205,7 +205,7 @@ impl MeasurementText {
             numbers.iter().fold(note.clone(), fill)
         };
         let titles = self.tables.iter().map(|table| &*table.title);
-        Study {
+        MeasuredStudy {
             notes: self.notes.iter().map(note).collect(),
             grids: titles.zip(grids).collect(),
             charts: chart.into_iter().collect(),
@@ -218,23 +218,23 @@ impl ClaimText {
     ///
     /// # Panics
     /// When the claim has no such row.
-    pub(super) fn row(&'static self, name: &str, computed: f64) -> Row {
+    pub(super) fn row(&'static self, name: &str, computed: f64) -> ClaimRow {
         let Some(text) = self.rows.get(name) else {
             panic!("claim {} of thesis.toml has no row {name}", self.number)
         };
-        Row {
+        ClaimRow {
             published: Published::parse(&text.published),
             known_difference: text.differs.clone(),
             input: text.given.clone(),
             is_aside: text.aside,
             remark: text.remark.clone(),
-            ..Row::ours(&text.what, &text.unit, computed)
+            ..ClaimRow::ours(&text.what, &text.unit, computed)
         }
     }
 
     /// The same with a measured number, which chance has a part in.
-    pub(super) fn measured(&'static self, name: &str, measured: &Estimate) -> Row {
-        Row {
+    pub(super) fn measured(&'static self, name: &str, measured: &Estimate) -> ClaimRow {
+        ClaimRow {
             interval: Some((measured.low, measured.high)),
             ..self.row(name, measured.value)
         }

@@ -70,7 +70,7 @@ impl FrameRequest {
     /// # Errors
     /// Unknown keys and bad values.
     pub fn policy(&self, policy: WindowPolicy) -> Result<WindowPolicy, InputError> {
-        policy.with(&self.windows, &self.spelling.name("windows"))
+        policy.with_changes(&self.windows, &self.spelling.name("windows"))
     }
 
     /// Everything that a frame depends on, and how its windows are chosen. Of a calibration the file is read.

@@ -14,17 +14,18 @@ use serde::{Deserialize, Serialize};
 use super::FrameRequest;
 use crate::analysis::VerdictReport;
 use crate::chip::{Mode, SensorConfig, WindowLaw, library_files};
-use crate::engine::{Work, variance_left_out};
+use crate::engine::{EngineWork, variance_left_out};
 use crate::files::{InputError, OutputFile, file_hash, parse_json};
-use crate::report::{Cell, DepthMap, write_npy_u16};
+use crate::report::{DepthImage, ImageCell, write_npy_u16};
 use crate::scene::{EyeSafety, Scene, Train};
 use crate::system::{
-    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, NoDepth, PhaseTimes, PixelDepth, Summary,
+    DistanceLaw, EngineKind, Frame, FrameSettings, FrameSummary, NoDepth, PhaseTimes, PixelDepth,
+    ToleranceResult,
 };
 
 /// What frame.json and drive.json say of an exposure alike, first of all.
 #[derive(Debug, Serialize)]
-pub struct Exposed<'a> {
+pub struct ExposureReport<'a> {
     /// What reports call the scene.
     pub(crate) scene_name: String,
     scene: &'a Scene,
@@ -42,7 +43,7 @@ pub struct Exposed<'a> {
 #[derive(Debug, Serialize)]
 pub struct FrameConfiguration<'a> {
     #[serde(flatten)]
-    exposed: Exposed<'a>,
+    exposed: ExposureReport<'a>,
     false_alarm_rate: f64,
     walk_correction: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,12 +61,12 @@ pub struct FrameReport<'a, P = ()> {
     /// What was asked for.
     #[serde(flatten)]
     pub configuration: FrameConfiguration<'a>,
-    summary: Summary,
+    summary: FrameSummary,
     remark: Option<&'a str>,
     photons_expected: f64,
-    work: Work,
+    work: EngineWork,
     timing: &'a VerdictReport,
-    tolerance: Option<&'a Kept>,
+    tolerance: Option<&'a ToleranceResult>,
     #[serde(skip_serializing_if = "Option::is_none")]
     variance_left_out: Option<f64>,
     distance: DistanceLaw,
@@ -91,8 +92,8 @@ impl FrameRequest {
         &self,
         scene_name: String,
         settings: &'a FrameSettings,
-    ) -> Exposed<'a> {
-        Exposed {
+    ) -> ExposureReport<'a> {
+        ExposureReport {
             scene_name,
             scene: &settings.scene,
             sensor: &settings.sensor,
@@ -215,7 +216,7 @@ impl<P: Serialize> FrameReport<'_, P> {
     pub fn write(&self, out: &Path, histograms: &[u16]) -> Result<(), InputError> {
         let text = serde_json::to_string(self).expect("numbers and words");
         let exposed = &self.configuration.exposed;
-        let drawn = Drawn {
+        let drawn = FramePictures {
             mode: exposed.sensor.mode,
             laser_cycles: exposed.laser_cycles,
             shape: self.histograms_shape,
@@ -231,7 +232,7 @@ impl<P: Serialize> FrameReport<'_, P> {
 /// As [`FrameReport::write`], and when `report` is none.
 pub fn write_frame(out: &Path, report: &str, histograms: &[u16]) -> Result<(), InputError> {
     let read: ReadReport = parse_json("frame.json", report, "the report of a frame")?;
-    let drawn = Drawn {
+    let drawn = FramePictures {
         mode: read.sensor.mode,
         laser_cycles: read.laser_cycles,
         shape: read.histograms_shape,
@@ -255,14 +256,14 @@ struct Chip {
 }
 
 /// What files beside frame.json show of a frame.
-struct Drawn<'a> {
+struct FramePictures<'a> {
     mode: Mode,
     laser_cycles: u32,
     shape: [usize; 3],
     macropixels: &'a [PixelDepth],
 }
 
-impl Drawn<'_> {
+impl FramePictures<'_> {
     fn write(&self, out: &Path, report: &str, histograms: &[u16]) -> Result<(), InputError> {
         let [rows, cols, bins] = self.shape;
         if histograms.len() != rows * cols * bins {
@@ -282,19 +283,19 @@ impl Drawn<'_> {
 ///
 /// # Errors
 /// When it cannot be written.
-fn depth_map(out: &Path, drawn: &Drawn<'_>) -> Result<(), InputError> {
+fn depth_map(out: &Path, drawn: &FramePictures<'_>) -> Result<(), InputError> {
     let mode = match drawn.mode {
         Mode::Guided => "guided",
         Mode::Conventional => "conventional",
     };
     let [rows, cols, _] = drawn.shape;
-    let cells: Vec<Cell> = (drawn.macropixels.iter())
+    let cells: Vec<ImageCell> = (drawn.macropixels.iter())
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
-            (_, Some(reason)) => Cell::Category(reason as usize),
-            (depth_m, None) => Cell::Depth(depth_m.unwrap_or_default() as f32),
+            (_, Some(reason)) => ImageCell::Category(reason as usize),
+            (depth_m, None) => ImageCell::Depth(depth_m.unwrap_or_default() as f32),
         })
         .collect();
-    let map = DepthMap {
+    let map = DepthImage {
         title: &format!("{mode} dToF depth, {} laser cycles", drawn.laser_cycles),
         cols,
         cells: &cells,
@@ -307,11 +308,11 @@ fn depth_map(out: &Path, drawn: &Drawn<'_>) -> Result<(), InputError> {
 }
 
 /// Shortest and longest depth, a little apart even if all are the same.
-fn depth_range(cells: &[Cell]) -> (f32, f32) {
+fn depth_range(cells: &[ImageCell]) -> (f32, f32) {
     let known = || {
         cells.iter().filter_map(|cell| match *cell {
-            Cell::Depth(depth_m) => Some(depth_m),
-            Cell::Category(_) => None,
+            ImageCell::Depth(depth_m) => Some(depth_m),
+            ImageCell::Category(_) => None,
         })
     };
     let shortest = known().fold(f32::INFINITY, f32::min);

@@ -17,7 +17,7 @@ mod spelling;
 mod wording;
 
 pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate, read_calibration};
-pub use self::frame_files::{Exposed, FrameConfiguration, FrameReport, write_frame};
+pub use self::frame_files::{ExposureReport, FrameConfiguration, FrameReport, write_frame};
 pub(crate) use self::frame_files::{eye_safety_of, frame_s, variance_left_out_of};
 pub use self::light::LightRequest;
 pub use self::sources::Sources;

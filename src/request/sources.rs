@@ -71,7 +71,7 @@ impl Sources {
     fn read_sensor_with(&self, mut scene: Option<&mut Document>) -> Result<Sensor, InputError> {
         let mut sensor = match &self.sensor {
             Some(path) => described(path, self.spelling)?,
-            None => Document::of("the sensor", toml::Table::new()),
+            None => Document::from_table("the sensor", toml::Table::new()),
         };
         for assignment in &self.set {
             let option = format!("{} {assignment}", self.spelling.name("set"));
@@ -261,5 +261,5 @@ fn described(path: &Path, spelling: Spelling) -> Result<Document, InputError> {
         InputError::new(path.display(), message)
     })?;
     let table = toml::Table::try_from(&*chip).expect("numbers and words");
-    Ok(Document::of(path.display(), table))
+    Ok(Document::from_table(path.display(), table))
 }

@@ -22,7 +22,7 @@ impl Spelling {
     }
 
     /// A setting with a value, a word.
-    pub(crate) fn with(self, key: &str, value: impl Display) -> String {
+    pub(crate) fn assignment(self, key: &str, value: impl Display) -> String {
         match self {
             Spelling::Options => format!("{} {value}", self.name(key)),
             Spelling::Keys => format!("{key} = \"{value}\""),
@@ -38,8 +38,8 @@ mod tests {
     fn settings_are_called_as_they_are_written() {
         let [options, keys] = [Spelling::Options, Spelling::Keys];
         assert_eq!(options.name("laser_cycles"), "--laser-cycles");
-        assert_eq!(options.with("engine", "gate"), "--engine gate");
+        assert_eq!(options.assignment("engine", "gate"), "--engine gate");
         assert_eq!(keys.name("laser_cycles"), "laser_cycles");
-        assert_eq!(keys.with("engine", "gate"), "engine = \"gate\"");
+        assert_eq!(keys.assignment("engine", "gate"), "engine = \"gate\"");
     }
 }

@@ -39,7 +39,7 @@ pub fn is_bad_input(error: &FrameError) -> bool {
 }
 
 fn cure(error: &EngineError, spelling: Spelling) -> Option<String> {
-    let engine = |name| spelling.with("engine", name);
+    let engine = |name| spelling.assignment("engine", name);
     Some(match error {
         EngineError::Race { race, .. } => {
             let cure = of_race(&race.cure, spelling);
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn refusals_come_with_options_that_help() {
-        let timing = ChipTiming::of(&SensorConfig::default());
+        let timing = ChipTiming::new(&SensorConfig::default());
         let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;
         let at_the_strobe = SensorConfig {
             clk_hz: 0.5 / strobe.as_s(),

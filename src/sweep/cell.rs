@@ -49,7 +49,7 @@ impl Column {
 
 /// One value of the table.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Cell {
+pub enum TableCell {
     /// Nothing.
     Empty,
     /// A whole number.
@@ -62,38 +62,38 @@ pub enum Cell {
     Truth(bool),
 }
 
-impl Cell {
+impl TableCell {
     /// A number, where there is one.
     pub(crate) fn maybe(number: Option<f64>) -> Self {
-        number.map_or(Cell::Empty, Cell::Number)
+        number.map_or(TableCell::Empty, TableCell::Number)
     }
 
     /// A count.
     pub(crate) fn count(count: usize) -> Self {
-        Cell::Whole(count as i64)
+        TableCell::Whole(count as i64)
     }
 
     /// A setting's value in a column that holds `holds`.
-    pub(super) fn of(value: &Value, holds: Holds) -> Self {
+    pub(super) fn from_value(value: &Value, holds: Holds) -> Self {
         match (value, holds) {
-            (Value::Integer(n), Holds::Number) => Cell::Number(*n as f64),
-            (Value::Integer(n), Holds::Whole) => Cell::Whole(*n),
-            (Value::Float(x), Holds::Number) => Cell::Number(*x),
-            (Value::Boolean(b), Holds::Truth) => Cell::Truth(*b),
-            (Value::String(s), _) => Cell::Word(s.clone()),
-            (other, _) => Cell::Word(other.to_string()),
+            (Value::Integer(n), Holds::Number) => TableCell::Number(*n as f64),
+            (Value::Integer(n), Holds::Whole) => TableCell::Whole(*n),
+            (Value::Float(x), Holds::Number) => TableCell::Number(*x),
+            (Value::Boolean(b), Holds::Truth) => TableCell::Truth(*b),
+            (Value::String(s), _) => TableCell::Word(s.clone()),
+            (other, _) => TableCell::Word(other.to_string()),
         }
     }
 
     /// As a field of a CSV file.
     pub(super) fn csv(&self) -> String {
         match self {
-            Cell::Empty => String::new(),
-            Cell::Whole(n) => n.to_string(),
-            Cell::Number(x) if x.is_nan() => String::new(),
-            Cell::Number(x) => format!("{x:?}"),
-            Cell::Truth(b) => b.to_string(),
-            Cell::Word(word) => {
+            TableCell::Empty => String::new(),
+            TableCell::Whole(n) => n.to_string(),
+            TableCell::Number(x) if x.is_nan() => String::new(),
+            TableCell::Number(x) => format!("{x:?}"),
+            TableCell::Truth(b) => b.to_string(),
+            TableCell::Word(word) => {
                 // Ends of lines in a field are allowed, but many readers take them for a row's.
                 quoted(&word.replace(['\n', '\r'], " "))
             }
@@ -103,34 +103,36 @@ impl Cell {
     /// As JSON, which has no infinite numbers.
     pub(super) fn json(&self) -> serde_json::Value {
         match self {
-            Cell::Empty => serde_json::Value::Null,
-            Cell::Whole(n) => (*n).into(),
-            Cell::Number(x) if x.is_infinite() => (if *x > 0.0 { "inf" } else { "-inf" }).into(),
-            Cell::Number(x) => (*x).into(),
-            Cell::Word(word) => word.as_str().into(),
-            Cell::Truth(b) => (*b).into(),
+            TableCell::Empty => serde_json::Value::Null,
+            TableCell::Whole(n) => (*n).into(),
+            TableCell::Number(x) if x.is_infinite() => {
+                (if *x > 0.0 { "inf" } else { "-inf" }).into()
+            }
+            TableCell::Number(x) => (*x).into(),
+            TableCell::Word(word) => word.as_str().into(),
+            TableCell::Truth(b) => (*b).into(),
         }
     }
 
-    /// From what [`Cell::json`] makes of a cell of such a column; `None` if it is no such thing.
+    /// From what [`TableCell::json`] makes of a cell of such a column; `None` if it is no such thing.
     pub(super) fn from_json(json: &serde_json::Value, holds: Holds) -> Option<Self> {
         Some(match (json, holds) {
-            (serde_json::Value::Null, _) => Cell::Empty,
-            (json, Holds::Whole) => Cell::Whole(json.as_i64()?),
+            (serde_json::Value::Null, _) => TableCell::Empty,
+            (json, Holds::Whole) => TableCell::Whole(json.as_i64()?),
             (serde_json::Value::String(infinite), Holds::Number) => {
-                Cell::Number(infinite.parse().ok()?)
+                TableCell::Number(infinite.parse().ok()?)
             }
-            (json, Holds::Number) => Cell::Number(json.as_f64()?),
-            (json, Holds::Word) => Cell::Word(json.as_str()?.to_owned()),
-            (json, Holds::Truth) => Cell::Truth(json.as_bool()?),
+            (json, Holds::Number) => TableCell::Number(json.as_f64()?),
+            (json, Holds::Word) => TableCell::Word(json.as_str()?.to_owned()),
+            (json, Holds::Truth) => TableCell::Truth(json.as_bool()?),
         })
     }
 
     /// The number in it, if it is one.
     pub(crate) fn number(&self) -> Option<f64> {
         match self {
-            Cell::Whole(n) => Some(*n as f64),
-            Cell::Number(x) => Some(*x),
+            TableCell::Whole(n) => Some(*n as f64),
+            TableCell::Number(x) => Some(*x),
             _ => None,
         }
     }
@@ -141,14 +143,14 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn any_cell() -> impl Strategy<Value = (Cell, Holds)> {
+    fn any_cell() -> impl Strategy<Value = (TableCell, Holds)> {
         prop_oneof![
-            Just((Cell::Empty, Holds::Number)),
-            any::<i64>().prop_map(|n| (Cell::Whole(n), Holds::Whole)),
+            Just((TableCell::Empty, Holds::Number)),
+            any::<i64>().prop_map(|n| (TableCell::Whole(n), Holds::Whole)),
             (any::<f64>().prop_filter("not a number", |x| !x.is_nan()))
-                .prop_map(|x| (Cell::Number(x), Holds::Number)),
-            "(?s).{0,20}".prop_map(|w| (Cell::Word(w), Holds::Word)),
-            any::<bool>().prop_map(|b| (Cell::Truth(b), Holds::Truth)),
+                .prop_map(|x| (TableCell::Number(x), Holds::Number)),
+            "(?s).{0,20}".prop_map(|w| (TableCell::Word(w), Holds::Word)),
+            any::<bool>().prop_map(|b| (TableCell::Truth(b), Holds::Truth)),
         ]
     }
 
@@ -158,7 +160,7 @@ mod tests {
         fn cells_come_back_from_json((cell, holds) in any_cell()) {
             let text = cell.json().to_string();
             let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-            prop_assert_eq!(Cell::from_json(&json, holds), Some(cell));
+            prop_assert_eq!(TableCell::from_json(&json, holds), Some(cell));
         }
 
         /// Words with ends of lines among them.

@@ -12,11 +12,11 @@
 
 use rand_philox::{philox4x32_10, u32_to_unit_f64};
 
-use crate::photon::{Purpose, philox_key};
+use crate::photon::{RandomPurpose, philox_key};
 
 /// How points are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Design {
+pub enum SamplingDesign {
     /// Every combination.
     Grid,
     /// So many points, evenly on every axis.
@@ -30,16 +30,16 @@ pub(super) const MOST_SOBOL_AXES: usize = 21;
 
 /// Where point `index` of a drawn design, which is no grid, lies on axis number `axis`, both from 0: as a share of the way, from 0 to less
 /// than 1.
-pub(super) fn share(design: Design, seed: u64, axis: usize, index: u64) -> f64 {
+pub(super) fn share(design: SamplingDesign, seed: u64, axis: usize, index: u64) -> f64 {
     let key = philox_key(seed);
     match design {
-        Design::Grid => unreachable!("a grid has values, no shares"),
-        Design::Latin(points) => {
+        SamplingDesign::Grid => unreachable!("a grid has values, no shares"),
+        SamplingDesign::Latin(points) => {
             let part = permuted(key, axis as u32, points, index);
             let [word, ..] = words(key, axis as u32, WITHIN, part);
             (part as f64 + u32_to_unit_f64(word)) / points as f64
         }
-        Design::Sobol(_) => {
+        SamplingDesign::Sobol(_) => {
             let [shift, ..] = words(key, axis as u32, SHIFT, 0);
             // In the middle of its cell, so that it is never 0.
             (f64::from(sobol(axis, index as u32) ^ shift) + 0.5) / 2f64.powi(32)
@@ -52,7 +52,7 @@ const WITHIN: u32 = 100;
 const SHIFT: u32 = 101;
 
 fn words(key: [u32; 2], axis: u32, what: u32, index: u64) -> [u32; 4] {
-    let purpose = (Purpose::Sweep as u32) << 16 | axis;
+    let purpose = (RandomPurpose::Sweep as u32) << 16 | axis;
     philox4x32_10([index as u32, (index >> 32) as u32, what, purpose], key)
 }
 
@@ -138,7 +138,7 @@ mod tests {
         #[test]
         fn a_latin_hypercube_has_one_point_in_each_part(seed: u64, axis in 0usize..9, points in 1u64..700) {
             let mut parts: Vec<u64> = (0..points)
-                .map(|i| (share(Design::Latin(points), seed, axis, i) * points as f64) as u64)
+                .map(|i| (share(SamplingDesign::Latin(points), seed, axis, i) * points as f64) as u64)
                 .collect();
             parts.sort_unstable();
             prop_assert!(parts.into_iter().eq(0..points));
@@ -149,7 +149,7 @@ mod tests {
         fn sobol_points_are_even_on_every_axis(seed: u64, axis in 0..MOST_SOBOL_AXES, bits in 0u32..11) {
             let points = 1u64 << bits;
             let mut parts: Vec<u64> = (0..points)
-                .map(|i| (share(Design::Sobol(points), seed, axis, i) * points as f64) as u64)
+                .map(|i| (share(SamplingDesign::Sobol(points), seed, axis, i) * points as f64) as u64)
                 .collect();
             parts.sort_unstable();
             prop_assert!(parts.into_iter().eq(0..points));
@@ -175,8 +175,12 @@ mod tests {
     #[test]
     fn orders_of_two_axes_have_nothing_to_do_with_each_other() {
         let n = 4096;
-        let at = |axis, i| share(Design::Latin(n), 7, axis, i) - 0.5;
-        let correlation = (0..n).map(|i| at(0, i) * at(1, i)).sum::<f64>() / n as f64 * 12.0;
+        let centred_share = |axis, i| share(SamplingDesign::Latin(n), 7, axis, i) - 0.5;
+        let correlation = (0..n)
+            .map(|i| centred_share(0, i) * centred_share(1, i))
+            .sum::<f64>()
+            / n as f64
+            * 12.0;
         assert!(correlation.abs() < 4.0 / (n as f64).sqrt(), "{correlation}");
     }
 }

@@ -2,9 +2,9 @@
 
 use toml::{Table, Value};
 
-use super::Kind;
+use super::StudyKind;
 use super::cell::Holds;
-use super::theory::Asked;
+use super::theory::TheorySettings;
 use crate::chip::SensorConfig;
 use crate::files::{instead_of, nearest};
 use crate::request::FrameRequest;
@@ -23,7 +23,7 @@ const WINDOWS: Key = Key::chosen("windows", Range::Text, "How windows are chosen
 
 /// A key, and what its values are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Known {
+pub(super) struct TypedKey {
     pub(super) key: Key,
     pub(super) holds: Holds,
 }
@@ -32,7 +32,7 @@ pub(super) struct Known {
 ///
 /// # Errors
 /// There is none: what there is instead.
-pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
+pub(super) fn find(kind: StudyKind, name: &str) -> Result<TypedKey, String> {
     let (group, rest) = name.split_once('.').unwrap_or((name, ""));
     let none = |there_are: String| Err(format!("{name} is not a key of a study; {there_are}"));
     let all = |keys: &[Key]| -> String {
@@ -43,8 +43,8 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
     let (found, defaults) = match (group, rest, kind) {
         ("sensor", "", _) => (Some(SENSOR), Table::new()),
         ("scene", "", _) => (Some(SCENE), Table::new()),
-        ("guide", "", Kind::Frame) => (Some(GUIDE), Table::new()),
-        ("windows", "", Kind::Frame) => (Some(WINDOWS), Table::new()),
+        ("guide", "", StudyKind::Frame) => (Some(GUIDE), Table::new()),
+        ("windows", "", StudyKind::Frame) => (Some(WINDOWS), Table::new()),
         ("sensor", key, _) => {
             let Some(found) = SensorConfig::key(key) else {
                 return none(
@@ -78,7 +78,7 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
             let defaults = defaults.get(section).and_then(Value::as_table);
             (Some(found), defaults.cloned().unwrap_or_default())
         }
-        ("windows", _, Kind::Frame) => match among(WindowPolicy::KEYS) {
+        ("windows", _, StudyKind::Frame) => match among(WindowPolicy::KEYS) {
             None => return none(all(WindowPolicy::KEYS)),
             found => {
                 let defaults = Table::try_from(WindowPolicy::for_sequences());
@@ -91,24 +91,24 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
         ("frame", "guides" | "windows", _) => {
             return none("guide and windows stand for themselves".into());
         }
-        ("frame", _, Kind::Frame) => match among(FrameRequest::KEYS) {
+        ("frame", _, StudyKind::Frame) => match among(FrameRequest::KEYS) {
             None => return none(all(FrameRequest::KEYS)),
             found => {
                 let all = FrameRequest::default();
                 (found, Table::try_from(all).expect("numbers and words"))
             }
         },
-        ("theory", _, Kind::Theory) => match among(Asked::KEYS) {
-            None => return none(all(Asked::KEYS)),
+        ("theory", _, StudyKind::Theory) => match among(TheorySettings::KEYS) {
+            None => return none(all(TheorySettings::KEYS)),
             found => (
                 found,
-                Table::try_from(Asked::default()).expect("numbers and words"),
+                Table::try_from(TheorySettings::default()).expect("numbers and words"),
             ),
         },
-        (_, _, Kind::Frame) => {
+        (_, _, StudyKind::Frame) => {
             return none("give one that begins with sensor, scene, guide, windows or frame".into());
         }
-        (_, _, Kind::Theory) => {
+        (_, _, StudyKind::Theory) => {
             return none("give one that begins with theory, sensor or scene".into());
         }
     };
@@ -121,15 +121,15 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
         Range::Switch => Holds::Truth,
         Range::OneOf(_) | Range::WordOrCurve(..) | Range::Text => Holds::Word,
     };
-    Ok(Known { key, holds })
+    Ok(TypedKey { key, holds })
 }
 
 /// A value of a key, as a plain number where it is a quantity.
 ///
 /// # Errors
 /// What is wrong with it: nothing that depends on other keys.
-pub(super) fn checked(known: &Known, value: &Value) -> Result<Value, String> {
-    let Known { key, holds } = known;
+pub(super) fn checked(known: &TypedKey, value: &Value) -> Result<Value, String> {
+    let TypedKey { key, holds } = known;
     let plain = match key.plain(value)? {
         Value::Float(x) if *holds == Holds::Whole && x.fract() == 0.0 => Value::Integer(x as i64),
         plain => plain,

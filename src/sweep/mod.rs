@@ -40,11 +40,11 @@ mod table;
 mod theory;
 mod values;
 
-pub use cell::{Cell, Column, Holds};
-pub use design::Design;
+pub use cell::{Column, Holds, TableCell};
+pub use design::SamplingDesign;
 pub use error::SweepError;
 pub use plot::{Drawing, Plot};
-pub use row::Row;
+pub use row::StudyRow;
 pub use run::{Outcome, Shard, run, study_of};
-pub use study::{Kind, MOST_POINTS, Study};
+pub use study::{MOST_POINTS, Study, StudyKind};
 pub use table::{CSV, PARQUET, Results, TIMES, columns};

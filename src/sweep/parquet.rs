@@ -12,7 +12,7 @@
 
 use std::io::{self, Write};
 
-use super::cell::{Cell, Column, Holds};
+use super::cell::{Column, Holds, TableCell};
 
 /// Rows of a group: 2¹⁶ numbers are half a mebibyte.
 const GROUP: usize = 1 << 16;
@@ -25,7 +25,7 @@ pub(super) struct Parquet<W: Write> {
     at: u64,
     columns: Vec<Column>,
     /// Cells of the group, column by column.
-    group: Vec<Vec<Cell>>,
+    group: Vec<Vec<TableCell>>,
     groups: Vec<Group>,
 }
 
@@ -53,7 +53,7 @@ impl<W: Write> Parquet<W> {
     }
 
     /// Adds a row, a cell for every column.
-    pub(super) fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> io::Result<()> {
+    pub(super) fn push(&mut self, row: impl IntoIterator<Item = TableCell>) -> io::Result<()> {
         for (column, cell) in self.group.iter_mut().zip(row) {
             column.push(cell);
         }
@@ -112,9 +112,10 @@ const PLAIN: i64 = 0;
 const RLE: i64 = 3;
 
 /// A page without its header: which cells there are, then their values.
-fn page(cells: &[Cell], holds: Holds) -> Vec<u8> {
-    let is_there =
-        |cell: &Cell| !matches!(cell, Cell::Empty) && cell.number().is_none_or(|x| !x.is_nan());
+fn page(cells: &[TableCell], holds: Holds) -> Vec<u8> {
+    let is_there = |cell: &TableCell| {
+        !matches!(cell, TableCell::Empty) && cell.number().is_none_or(|x| !x.is_nan())
+    };
     // One run of bits, eight cells to a byte.
     let mut bits = Vec::new();
     varint(&mut bits, (cells.len().div_ceil(8) as u64) << 1 | 1);
@@ -123,16 +124,16 @@ fn page(cells: &[Cell], holds: Holds) -> Vec<u8> {
     page.extend(bits);
     let there = cells.iter().filter(|cell| is_there(cell));
     match holds {
-        Holds::Truth => pack(&mut page, there.map(|cell| *cell == Cell::Truth(true))),
+        Holds::Truth => pack(&mut page, there.map(|cell| *cell == TableCell::Truth(true))),
         Holds::Whole => there.for_each(|cell| match cell {
-            Cell::Whole(n) => page.extend(n.to_le_bytes()),
+            TableCell::Whole(n) => page.extend(n.to_le_bytes()),
             other => debug_assert!(false, "{other:?} among whole numbers"),
         }),
         Holds::Number => there.for_each(|cell| {
             page.extend(cell.number().unwrap_or(f64::NAN).to_le_bytes());
         }),
         Holds::Word => there.for_each(|cell| match cell {
-            Cell::Word(word) => {
+            TableCell::Word(word) => {
                 page.extend((word.len() as u32).to_le_bytes());
                 page.extend(word.as_bytes());
             }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::cell::{Cell, Column, Holds};
+use super::cell::{Column, Holds, TableCell};
 use super::study::Study;
 use crate::files::InputError;
 use crate::report::{Axis, Chart, Style};
@@ -57,20 +57,20 @@ pub struct Drawing<'a> {
     y: Column,
     is_log: bool,
     /// By series, and in it by x.
-    series: BTreeMap<String, BTreeMap<Order, Seen>>,
+    series: BTreeMap<String, BTreeMap<Order, ValueStatistics>>,
 }
 
 /// Values at one x.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct ValueStatistics {
     sum: f64,
     count: u64,
     least: f64,
     most: f64,
 }
 
-impl Seen {
-    const NOTHING: Seen = Seen {
+impl ValueStatistics {
+    const NOTHING: ValueStatistics = ValueStatistics {
         sum: 0.0,
         count: 0,
         least: f64::INFINITY,
@@ -157,7 +157,7 @@ impl<'a> Drawing<'a> {
     }
 
     /// Sees a row.
-    pub(crate) fn see(&mut self, cells: &[Cell]) {
+    pub(crate) fn add_row(&mut self, cells: &[TableCell]) {
         let [x, y] = self.columns;
         let (Some(x), Some(y)) = (cells[x].number(), cells[y].number()) else {
             return;
@@ -167,14 +167,14 @@ impl<'a> Drawing<'a> {
         }
         let name = match self.series_column.map(|column| &cells[column]) {
             None => String::new(),
-            Some(Cell::Number(x)) => x.to_string(),
+            Some(TableCell::Number(x)) => x.to_string(),
             Some(other) => other.csv(),
         };
         if self.series.len() > MOST_SERIES {
             return;
         }
         let at = self.series.entry(name).or_default();
-        let seen = at.entry(Order(x)).or_insert(Seen::NOTHING);
+        let seen = at.entry(Order(x)).or_insert(ValueStatistics::NOTHING);
         seen.sum += y;
         seen.count += 1;
         seen.least = seen.least.min(y);
@@ -219,7 +219,7 @@ impl<'a> Drawing<'a> {
             let is_cloud = at.len() == 1 || (at.len() > 50 && rows < 2 * at.len() as u64);
             let style = if is_cloud { Style::Points } else { Style::Line };
             let means = at.iter().map(|(x, seen)| (x.0, seen.mean()));
-            chart = chart.with(label, style, means);
+            chart = chart.with_series(label, style, means);
             if rows > at.len() as u64 {
                 let ends = at
                     .iter()
@@ -247,10 +247,13 @@ mod tests {
         let mut drawing = Drawing::new(&plot, &study, &columns, "--plot").unwrap();
         let p_miss = columns.iter().position(|c| c.name == "p_miss").unwrap();
         for (x, y) in [(2.0, 5.0), (1.0, 1.0), (2.0, 7.0), (1.0, f64::INFINITY)] {
-            let mut cells = vec![Cell::Empty; columns.len()];
-            (cells[1], cells[2], cells[p_miss]) =
-                (Cell::Number(x), Cell::Number(0.5), Cell::Number(y));
-            drawing.see(&cells);
+            let mut cells = vec![TableCell::Empty; columns.len()];
+            (cells[1], cells[2], cells[p_miss]) = (
+                TableCell::Number(x),
+                TableCell::Number(0.5),
+                TableCell::Number(y),
+            );
+            drawing.add_row(&cells);
         }
         let chart = drawing.chart(&study, "--plot").unwrap();
         let series: Vec<_> = chart

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 
-use super::cell::{Cell, Column};
+use super::cell::{Column, TableCell};
 use crate::files::{InputError, JournalReader, journal_line};
 
 /// Which results are the same: to be raised with every change of the program that changes a row. A test holds a frame to it.
@@ -17,7 +17,7 @@ pub(super) struct Key(u128);
 
 impl Key {
     /// Of a point whose `content` says all of it, with results in `columns`.
-    pub(super) fn of(kind: &str, columns: &[Column], content: &str) -> Self {
+    pub(super) fn from_content(kind: &str, columns: &[Column], content: &str) -> Self {
         let mut hash = Sha256::new();
         for part in [
             "gdtof",
@@ -50,23 +50,23 @@ impl Key {
 
 /// The results of a point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct StudyRow {
     /// What it took, s; 0 where nobody measured.
     pub run_time_s: f64,
     /// Why there are no results, where there are none.
     pub error: Option<String>,
     /// A cell for each column of results; none at all where there is an error.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<TableCell>,
 }
 
-impl Row {
+impl StudyRow {
     /// The line of a journal.
     pub(super) fn line(&self, key: Key) -> String {
         let mut parts: Vec<Json> = vec![
             self.run_time_s.into(),
             self.error.as_deref().map_or(Json::Null, Json::from),
         ];
-        parts.extend(self.cells.iter().map(Cell::json));
+        parts.extend(self.cells.iter().map(TableCell::json));
         journal_line(&format!("{:032x} {}", key.0, Json::from(parts)))
     }
 
@@ -86,10 +86,10 @@ impl Row {
         if cells.len() != wanted {
             return None;
         }
-        let cells: Option<Vec<Cell>> = (cells.iter().zip(columns))
-            .map(|(cell, column)| Cell::from_json(cell, column.holds))
+        let cells: Option<Vec<TableCell>> = (cells.iter().zip(columns))
+            .map(|(cell, column)| TableCell::from_json(cell, column.holds))
             .collect();
-        Some(Row {
+        Some(StudyRow {
             run_time_s: run_time_s.as_f64()?,
             error,
             cells: cells?,
@@ -116,13 +116,14 @@ impl Index {
     ///
     /// # Errors
     /// When one cannot be read.
-    pub(super) fn of(paths: Vec<PathBuf>, columns: &[Column]) -> Result<Self, InputError> {
+    pub(super) fn read(paths: Vec<PathBuf>, columns: &[Column]) -> Result<Self, InputError> {
         let mut index = Index::default();
         for (number, path) in paths.iter().enumerate() {
             let places = &mut index.places;
             index.spoilt += JournalReader::open(path)?.scan(|begin, text| {
                 let key = text.split_once(' ').and_then(|(key, _)| Key::parse(key));
-                if let Some(key) = key.filter(|&key| Row::parse(text, key, columns).is_some()) {
+                if let Some(key) = key.filter(|&key| StudyRow::parse(text, key, columns).is_some())
+                {
                     places.push((key.prefix(), (number as u64) << OFFSET_BITS | begin));
                 }
             })?;
@@ -173,13 +174,13 @@ impl Rows<'_> {
     ///
     /// # Errors
     /// When the journal cannot be read.
-    pub(super) fn get(&mut self, key: Key) -> Result<Option<Row>, InputError> {
+    pub(super) fn get(&mut self, key: Key) -> Result<Option<StudyRow>, InputError> {
         let Some(place) = self.index.place(key) else {
             return Ok(None);
         };
         let reader = &mut self.readers[(place >> OFFSET_BITS) as usize];
-        let text = reader.at(place & ((1 << OFFSET_BITS) - 1))?;
-        Ok(text.and_then(|text| Row::parse(text, key, self.columns)))
+        let text = reader.read_line_at(place & ((1 << OFFSET_BITS) - 1))?;
+        Ok(text.and_then(|text| StudyRow::parse(text, key, self.columns)))
     }
 }
 
@@ -216,21 +217,21 @@ mod tests {
         ];
         let dir = tempfile::tempdir().unwrap();
         let row = |i: usize| match i % 5 {
-            0 => Row {
+            0 => StudyRow {
                 run_time_s: 0.1,
                 error: Some(format!("no {i}")),
                 cells: Vec::new(),
             },
-            _ => Row {
+            _ => StudyRow {
                 run_time_s: 0.25,
                 error: None,
                 cells: vec![
-                    Cell::Number(1.0 / i as f64),
-                    Cell::Word("a \"b\", c".into()),
+                    TableCell::Number(1.0 / i as f64),
+                    TableCell::Word("a \"b\", c".into()),
                 ],
             },
         };
-        let key = |i: usize| Key::of("x", &columns, &i.to_string());
+        let key = |i: usize| Key::from_content("x", &columns, &i.to_string());
         for name in ["journal.log", "journal-2-of-2.log", "notes.txt"] {
             let mut journal = Journal::open(&dir.path().join(name)).unwrap().unwrap();
             let own = (0..300).filter(|i| (i % 3 == 0) == (name == "journal.log"));
@@ -238,20 +239,20 @@ mod tests {
                 journal.append(&row(i).line(key(i))).unwrap();
             }
         }
-        let index = Index::of(journals_in(dir.path()), &columns).unwrap();
+        let index = Index::read(journals_in(dir.path()), &columns).unwrap();
         assert_eq!(index.places.len(), 300);
         let mut rows = index.rows(&columns).unwrap();
         for i in (0..300).rev() {
             assert_eq!(rows.get(key(i)).unwrap(), Some(row(i)));
         }
         assert_eq!(rows.get(key(300)).unwrap(), None);
-        assert_ne!(Key::of("x", &columns[..1], "7"), key(7));
+        assert_ne!(Key::from_content("x", &columns[..1], "7"), key(7));
     }
 
     #[test]
     fn a_row_of_no_use_is_not_there() {
         let columns = [Column::new("a", "", Holds::Whole)];
-        let key = |i: usize| Key::of("x", &columns, &i.to_string());
+        let key = |i: usize| Key::from_content("x", &columns, &i.to_string());
         let unusable = [
             "nonsense",
             "[]",
@@ -269,13 +270,13 @@ mod tests {
             let line = journal_line(&format!("{:032x} {text}", key(i).0));
             journal.append(&line).unwrap();
         }
-        let row = Row {
+        let row = StudyRow {
             run_time_s: 0.0,
             error: None,
-            cells: vec![Cell::Whole(7)],
+            cells: vec![TableCell::Whole(7)],
         };
         journal.append(&row.line(key(0))).unwrap();
-        let index = Index::of(journals_in(dir.path()), &columns).unwrap();
+        let index = Index::read(journals_in(dir.path()), &columns).unwrap();
         assert_eq!((index.places.len(), index.spoilt), (1, 0));
         assert_eq!(
             index.rows(&columns).unwrap().get(key(0)).unwrap(),

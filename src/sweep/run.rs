@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::SweepError;
 use super::row::{Index, journals_in};
-use super::study::{Kind, Study};
+use super::study::{Study, StudyKind};
 use super::subject::{Scratch, Subject};
 use crate::engine::Answer;
 use crate::files::{
@@ -22,15 +22,15 @@ pub struct Shard {
     /// From 0.
     pub part: u64,
     /// At least 1.
-    pub of: u64,
+    pub parts: u64,
 }
 
 impl Shard {
     /// The whole.
-    pub const WHOLE: Shard = Shard { part: 0, of: 1 };
+    pub const WHOLE: Shard = Shard { part: 0, parts: 1 };
 
     fn journal(self) -> String {
-        match self.of {
+        match self.parts {
             1 => "journal.log".into(),
             of => format!("journal-{}-of-{of}.log", self.part + 1),
         }
@@ -38,7 +38,7 @@ impl Shard {
 
     /// How many of `points` points are its own.
     pub(crate) fn share(self, points: u64) -> u64 {
-        points.saturating_sub(self.part).div_ceil(self.of)
+        points.saturating_sub(self.part).div_ceil(self.parts)
     }
 }
 
@@ -59,7 +59,7 @@ pub struct Outcome {
 
 /// The study that a folder holds results of.
 #[derive(Debug, Serialize, Deserialize)]
-struct Kept {
+struct StoredStudy {
     name: String,
     source: String,
     folder: PathBuf,
@@ -90,7 +90,7 @@ pub fn run<A: Answer>(
     let path = folder.join(shard.journal());
     refuse_input(&path)?;
     set_aside_foreign(&folder.join(STUDY), |file| {
-        serde_json::from_reader::<_, Kept>(file).is_ok()
+        serde_json::from_reader::<_, StoredStudy>(file).is_ok()
     })?;
     set_aside_foreign(&path, is_journal)?;
     let Some(journal) = Journal::open(&path)? else {
@@ -99,15 +99,15 @@ pub fn run<A: Answer>(
         return Err(InputError::new(path.display(), message).into());
     };
     keep(study, folder)?;
-    let there = Index::of(journals_in(folder), &Subject::columns(study.kind))?;
+    let there = Index::read(journals_in(folder), &Subject::columns(study.kind))?;
     let points = shard.share(study.len());
     let workers = (rayon::current_num_threads() as u64).min(points).max(1);
     // A theoretical point takes less than a write.
     let batch = match study.kind {
-        Kind::Frame => 1,
-        Kind::Theory => 256,
+        StudyKind::Frame => 1,
+        StudyKind::Theory => 256,
     };
-    let work = Work {
+    let work = SharedSweep {
         subject: Subject::new(study),
         study,
         shard,
@@ -120,17 +120,17 @@ pub fn run<A: Answer>(
         failed: AtomicBool::new(false),
         error: Mutex::new(None),
     };
-    if points < 2 * workers && study.kind == Kind::Frame {
+    if points < 2 * workers && study.kind == StudyKind::Frame {
         // Too few to go round: all threads on one frame after the other.
-        work.go(&done);
+        work.take_points(&done);
     } else {
         std::thread::scope(|scope| {
             for _ in 0..workers {
                 scope.spawn(
                     || match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-                        Ok(own) => own.install(|| work.go(&done)),
+                        Ok(own) => own.install(|| work.take_points(&done)),
                         // No more threads to be had: in the common pool, slower.
-                        Err(_) => work.go(&done),
+                        Err(_) => work.take_points(&done),
                     },
                 );
             }
@@ -154,7 +154,7 @@ pub fn run<A: Answer>(
 }
 
 /// What all threads share.
-struct Work<'a> {
+struct SharedSweep<'a> {
     subject: Subject<'a>,
     study: &'a Study,
     shard: Shard,
@@ -169,9 +169,9 @@ struct Work<'a> {
     error: Mutex<Option<SweepError>>,
 }
 
-impl Work<'_> {
+impl SharedSweep<'_> {
     /// Takes points until there are no more.
-    fn go<A: Answer>(&self, done: &(impl Fn(u64) -> A + Sync)) {
+    fn take_points<A: Answer>(&self, done: &(impl Fn(u64) -> A + Sync)) {
         let mut scratch = Scratch::default();
         while !self.failed.load(Ordering::Relaxed) {
             let begin = self.next.fetch_add(self.batch, Ordering::Relaxed);
@@ -179,7 +179,7 @@ impl Work<'_> {
                 return;
             }
             let end = (begin + self.batch).min(self.points);
-            let taken = self.take(begin..end, &mut scratch);
+            let taken = self.run_batch(begin..end, &mut scratch);
             let stops = done(end - begin).stops();
             if let Err(error) = taken.and(if stops {
                 Err(SweepError::Stopped)
@@ -195,11 +195,15 @@ impl Work<'_> {
         }
     }
 
-    fn take(&self, batch: std::ops::Range<u64>, scratch: &mut Scratch) -> Result<(), SweepError> {
+    fn run_batch(
+        &self,
+        batch: std::ops::Range<u64>,
+        scratch: &mut Scratch,
+    ) -> Result<(), SweepError> {
         let mut lines = String::new();
         let mut counts = [0; 3];
         for at in batch {
-            let index = self.shard.part + at * self.shard.of;
+            let index = self.shard.part + at * self.shard.parts;
             let point = self.study.point(index);
             let Ok(ready) = self.subject.ready(&point, scratch) else {
                 // Found out again, and said, when the table is written.
@@ -212,7 +216,7 @@ impl Work<'_> {
                 continue;
             }
             let key = ready.key;
-            let row = self.subject.take(ready, scratch)?;
+            let row = self.subject.compute_row(ready, scratch)?;
             counts[1] += 1;
             counts[2] += u64::from(row.error.is_some());
             lines += &row.line(key);
@@ -233,7 +237,7 @@ impl Work<'_> {
 /// Writes down which study a folder is of.
 fn keep(study: &Study, folder: &Path) -> Result<(), InputError> {
     let here = std::path::absolute(study.folder()).unwrap_or_else(|_| study.folder().to_owned());
-    let kept = Kept {
+    let kept = StoredStudy {
         name: study.name.clone(),
         source: study.source().to_owned(),
         folder: here,
@@ -256,7 +260,7 @@ pub fn study_of(folder: &Path) -> Result<Study, InputError> {
         return Err(InputError::new(folder.display(), message));
     }
     let text = read_text(&path)?;
-    let kept: Kept = parse_json(
+    let kept: StoredStudy = parse_json(
         path.display(),
         &text,
         "a folder that `gdtof sweep` has written",

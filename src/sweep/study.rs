@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use toml::Value;
 
-use super::design::{self, Design};
-use super::values::{Axis, Values, Varied};
+use super::design::{self, SamplingDesign};
+use super::values::{Axis, Values, VariedKey};
 use crate::settings::words;
 
 mod files;
@@ -16,7 +16,7 @@ words! {
     /// What is made of each point.
     #[derive(Default)]
     #[non_exhaustive]
-    pub enum Kind {
+    pub enum StudyKind {
         /// A guided frame.
         #[default]
         Frame = "frame",
@@ -34,7 +34,7 @@ pub struct Study {
     /// What reports call it.
     pub name: String,
     /// What is made of each point.
-    pub kind: Kind,
+    pub kind: StudyKind,
     /// Folder of its results, as written: relative to the current one.
     pub out: PathBuf,
     /// Seed of the first replica.
@@ -42,7 +42,7 @@ pub struct Study {
     /// Times that each point is taken.
     pub replicas: u64,
     /// Which points are taken.
-    pub design: Design,
+    pub design: SamplingDesign,
     /// Its text, and what complaints call it.
     text: String,
     source: String,
@@ -54,7 +54,7 @@ pub struct Study {
 
 /// A point of a study: values of the keys that vary, and its seed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Point {
+pub(super) struct StudyPoint {
     /// In the order of [`Study::varied`].
     pub(super) values: Vec<Value>,
     pub(super) seed: u64,
@@ -64,10 +64,10 @@ impl Study {
     /// Its points; `None` for more than [`MOST_POINTS`].
     fn points(&self) -> Option<u64> {
         let places = match self.design {
-            Design::Grid => self.axes.iter().try_fold(1u64, |product, axis| {
+            SamplingDesign::Grid => self.axes.iter().try_fold(1u64, |product, axis| {
                 product.checked_mul(axis.len().expect("checked"))
             })?,
-            Design::Latin(points) | Design::Sobol(points) => points,
+            SamplingDesign::Latin(points) | SamplingDesign::Sobol(points) => points,
         };
         places
             .checked_mul(self.replicas)
@@ -105,16 +105,16 @@ impl Study {
     }
 
     /// Keys that vary, in the order of the points' values.
-    pub(super) fn varied(&self) -> impl Iterator<Item = &Varied> {
+    pub(super) fn varied(&self) -> impl Iterator<Item = &VariedKey> {
         self.axes.iter().flat_map(|axis| &axis.0)
     }
 
     /// The point of this number.
-    pub(super) fn point(&self, index: u64) -> Point {
+    pub(super) fn point(&self, index: u64) -> StudyPoint {
         let (place, replica) = (index / self.replicas, index % self.replicas);
         let mut values = Vec::new();
         match self.design {
-            Design::Grid => {
+            SamplingDesign::Grid => {
                 let mut rest = place;
                 for axis in self.axes.iter().rev() {
                     let len = axis.len().expect("checked");
@@ -132,14 +132,14 @@ impl Study {
             }
         }
         let seed = self.seed + replica;
-        Point { values, seed }
+        StudyPoint { values, seed }
     }
 
     /// Whether an axis is a range in equal ratios.
     pub(super) fn is_log(&self, column: &str) -> bool {
         let mut varied = self.varied();
         let found = varied.find(|varied| varied.column.name == column);
-        matches!(found, Some(Varied { values: Values::Range(span), .. }) if span.is_log)
+        matches!(found, Some(VariedKey { values: Values::Range(span), .. }) if span.is_log)
     }
 }
 
@@ -190,10 +190,10 @@ mod tests {
             let low = points.iter().filter(|point| point[2] < 31.6).count();
             assert!((28..=36).contains(&low), "{design}: {low}");
             for threshold in 1..=4 {
-                let of = points
+                let with_threshold = points
                     .iter()
                     .filter(|point| point[1] == f64::from(threshold));
-                assert_eq!(of.count(), 16, "{design}");
+                assert_eq!(with_threshold.count(), 16, "{design}");
             }
         }
     }

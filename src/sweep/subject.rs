@@ -8,16 +8,16 @@ use std::time::Instant;
 use serde_json::Value as Json;
 use toml::{Table, Value};
 
-use super::cell::{Cell, Column, Holds};
+use super::cell::{Column, Holds, TableCell};
 use super::error::SweepError;
-use super::row::{Key, Row};
-use super::study::{Kind, Point, Study};
-use super::theory::{self, Last, Rig, Wall};
+use super::row::{Key, StudyRow};
+use super::study::{Study, StudyKind, StudyPoint};
+use super::theory::{self, Rig, TheoryCache, Wall};
 use crate::chip::{Sensor, SensorConfig, library_files};
 use crate::files::{InputError, file_hash, in_plain_words};
 use crate::request::{FrameRequest, Sources, Spelling, eye_safety_of, is_bad_input, sentence};
 use crate::scene::{EyeSafety, Scene};
-use crate::system::{Frame, NoDepth, SharedWork, Summary, WindowPolicy, take_shared_frame};
+use crate::system::{Frame, FrameSummary, NoDepth, SharedWork, WindowPolicy, take_shared_frame};
 
 /// A study's points as they are taken.
 pub(super) struct Subject<'a> {
@@ -38,7 +38,7 @@ const MOST_SENSORS: usize = 64;
 #[derive(Default)]
 pub(super) struct Scratch {
     world: Option<Arc<World>>,
-    theory: Last,
+    theory: TheoryCache,
 }
 
 /// A sensor before a scene.
@@ -52,7 +52,7 @@ struct World {
 }
 
 /// A point whose settings have been read.
-pub(super) struct Ready {
+pub(super) struct PointTask {
     pub(super) key: Key,
     task: Task,
 }
@@ -76,10 +76,10 @@ impl<'a> Subject<'a> {
     }
 
     /// Columns of results.
-    pub(super) fn columns(kind: Kind) -> Vec<Column> {
+    pub(super) fn columns(kind: StudyKind) -> Vec<Column> {
         match kind {
-            Kind::Frame => frame_columns(),
-            Kind::Theory => theory::columns(),
+            StudyKind::Frame => frame_columns(),
+            StudyKind::Theory => theory::columns(),
         }
     }
 
@@ -87,7 +87,11 @@ impl<'a> Subject<'a> {
     ///
     /// # Errors
     /// An impossible point: a sensor or a scene with values that do not go together, or files that cannot be read.
-    pub(super) fn ready(&self, point: &Point, scratch: &mut Scratch) -> Result<Ready, InputError> {
+    pub(super) fn ready(
+        &self,
+        point: &StudyPoint,
+        scratch: &mut Scratch,
+    ) -> Result<PointTask, InputError> {
         let mut sources = Sources::default();
         let mut frame = Table::new();
         let mut windows: Vec<String> = Vec::new();
@@ -123,12 +127,12 @@ impl<'a> Subject<'a> {
         scratch.world = Some(Arc::clone(&world));
         let key = |content: &str| {
             let kind = match self.study.kind {
-                Kind::Frame => "frame",
-                Kind::Theory => "theory",
+                StudyKind::Frame => "frame",
+                StudyKind::Theory => "theory",
             };
-            Key::of(kind, &self.columns, content)
+            Key::from_content(kind, &self.columns, content)
         };
-        if self.study.kind == Kind::Theory {
+        if self.study.kind == StudyKind::Theory {
             let asked = of_theory.try_into().expect("every value has been checked");
             if let Some(key) = world.scene.not_gaussian() {
                 let message = "theory is of Gaussian pulses; leave this out, or study frames";
@@ -139,7 +143,7 @@ impl<'a> Subject<'a> {
                 return Err(InputError::new("sensor.dead_time_spread", message));
             }
             let wall = Box::new(Wall::new(world.rig, &asked));
-            return Ok(Ready {
+            return Ok(PointTask {
                 key: key(&format!("{wall:?}")),
                 task: Task::Theory(wall),
             });
@@ -167,7 +171,7 @@ impl<'a> Subject<'a> {
         for path in of_guides.chain(request.calibration.as_deref()) {
             content += &self.hash(path);
         }
-        Ok(Ready {
+        Ok(PointTask {
             key: key(&content),
             task: Task::Frame(world, Box::new(request)),
         })
@@ -242,9 +246,13 @@ impl<'a> Subject<'a> {
     ///
     /// # Errors
     /// Faults of the program; a frame that an engine refuses is a row that says so.
-    pub(super) fn take(&self, ready: Ready, scratch: &mut Scratch) -> Result<Row, SweepError> {
+    pub(super) fn compute_row(
+        &self,
+        ready: PointTask,
+        scratch: &mut Scratch,
+    ) -> Result<StudyRow, SweepError> {
         match ready.task {
-            Task::Theory(wall) => Ok(Row {
+            Task::Theory(wall) => Ok(StudyRow {
                 run_time_s: 0.0,
                 error: None,
                 cells: wall.results(&mut scratch.theory),
@@ -257,12 +265,12 @@ impl<'a> Subject<'a> {
                 });
                 let run_time_s = begin.elapsed().as_secs_f64();
                 match taken {
-                    Ok(frame) => Ok(Row {
+                    Ok(frame) => Ok(StudyRow {
                         run_time_s,
                         error: None,
                         cells: frame_cells(&frame, &world, &request),
                     }),
-                    Err(why) if is_bad_input(&why) => Ok(Row {
+                    Err(why) if is_bad_input(&why) => Ok(StudyRow {
                         run_time_s,
                         error: Some(sentence(&why, Spelling::Keys)),
                         cells: Vec::new(),
@@ -275,15 +283,15 @@ impl<'a> Subject<'a> {
 }
 
 /// A frame that has been taken.
-struct Taken<'a> {
-    summary: Summary,
+struct FrameResult<'a> {
+    summary: FrameSummary,
     frame: &'a Frame,
     sensor: &'a SensorConfig,
     eye_safety: Option<EyeSafety>,
 }
 
-impl Taken<'_> {
-    fn without(&self, reason: NoDepth) -> usize {
+impl FrameResult<'_> {
+    fn count_without(&self, reason: NoDepth) -> usize {
         let number = self.summary.no_depth.get(&reason);
         number.copied().unwrap_or(0)
     }
@@ -300,8 +308,8 @@ impl Taken<'_> {
 
 /// What a column has of a frame.
 enum Of {
-    Whole(Box<dyn Fn(&Taken) -> usize>),
-    Number(&'static str, fn(&Taken) -> Option<f64>),
+    Whole(Box<dyn Fn(&FrameResult) -> usize>),
+    Number(&'static str, fn(&FrameResult) -> Option<f64>),
 }
 
 /// Columns of the fields of a summary, by their names.
@@ -318,8 +326,11 @@ macro_rules! fields {
 fn results() -> Vec<(String, Of)> {
     let no_depth = |reason: NoDepth| {
         let name = reason.name().replace(' ', "_").to_lowercase();
-        let of = move |t: &Taken| t.without(reason);
-        (format!("no_depth_{name}"), Of::Whole(Box::new(of)))
+        let pixels_without = move |t: &FrameResult| t.count_without(reason);
+        (
+            format!("no_depth_{name}"),
+            Of::Whole(Box::new(pixels_without)),
+        )
     };
     let number = |name: &str, unit, of| (name.to_owned(), Of::Number(unit, of));
     let mut all = vec![(
@@ -357,17 +368,17 @@ fn frame_columns() -> Vec<Column> {
     results().into_iter().map(column).collect()
 }
 
-fn frame_cells(frame: &Frame, world: &World, request: &FrameRequest) -> Vec<Cell> {
+fn frame_cells(frame: &Frame, world: &World, request: &FrameRequest) -> Vec<TableCell> {
     let sensor = &world.sensor;
-    let taken = Taken {
+    let taken = FrameResult {
         summary: frame.summary(),
         frame,
         sensor,
         eye_safety: eye_safety_of(sensor, &world.scene, request.laser_cycles, frame),
     };
     let cell = |(_, of)| match of {
-        Of::Whole(of) => Cell::count(of(&taken)),
-        Of::Number(_, of) => Cell::maybe(of(&taken)),
+        Of::Whole(of) => TableCell::count(of(&taken)),
+        Of::Number(_, of) => TableCell::maybe(of(&taken)),
     };
     results().into_iter().map(cell).collect()
 }
@@ -423,13 +434,13 @@ mod tests {
         let study = study(text);
         let subject = Subject::new(&study);
         let mut scratch = Scratch::default();
-        let of = |index| {
+        let key = |index| {
             subject
                 .ready(&study.point(index), &mut scratch)
                 .unwrap()
                 .key
         };
-        (0..study.len()).map(of).collect()
+        (0..study.len()).map(key).collect()
     }
 
     #[test]
@@ -482,14 +493,14 @@ mod tests {
         let subject = Subject::new(&study);
         let mut scratch = Scratch::default();
         let ready = subject.ready(&study.point(0), &mut scratch).unwrap();
-        let row = subject.take(ready, &mut scratch).unwrap();
+        let row = subject.compute_row(ready, &mut scratch).unwrap();
         assert_eq!(row.error, None);
-        let of = |name: &str| {
+        let number = |name: &str| {
             let at = frame_columns().iter().position(|c| c.name == name).unwrap();
             row.cells[at].number().unwrap()
         };
-        assert_eq!((of("depths"), of("counts")), (28.0, 6745.0));
-        let error_m = of("rms_error_m");
+        assert_eq!((number("depths"), number("counts")), (28.0, 6745.0));
+        let error_m = number("rms_error_m");
         assert!((error_m - 13.252_88).abs() < 1e-4, "{error_m}");
     }
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::cell::{Cell, Column, Holds};
+use super::cell::{Column, Holds, TableCell};
 use super::error::SweepError;
 use super::parquet::Parquet;
-use super::row::{Index, Row, journals_in};
-use super::study::{Kind, Study};
+use super::row::{Index, StudyRow, journals_in};
+use super::study::{Study, StudyKind};
 use super::subject::{Scratch, Subject};
 use crate::files::{InputError, OutputFile};
 
@@ -27,7 +27,7 @@ pub const TIMES: &str = "times.csv";
 pub fn columns(study: &Study) -> Vec<Column> {
     let mut columns = vec![Column::new("point", "", Holds::Whole)];
     columns.extend(study.varied().map(|varied| varied.column.clone()));
-    if study.kind == Kind::Frame {
+    if study.kind == StudyKind::Frame {
         columns.push(Column::new("seed", "", Holds::Whole));
     }
     columns.extend(Subject::columns(study.kind));
@@ -46,12 +46,12 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// When one cannot be read.
-    pub fn of(study: &'a Study, folders: &[PathBuf]) -> Result<Self, InputError> {
+    pub fn read(study: &'a Study, folders: &[PathBuf]) -> Result<Self, InputError> {
         let journals = folders
             .iter()
             .flat_map(|folder| journals_in(folder))
             .collect();
-        let index = Index::of(journals, &Subject::columns(study.kind))?;
+        let index = Index::read(journals, &Subject::columns(study.kind))?;
         Ok(Results { study, index })
     }
 
@@ -61,7 +61,7 @@ impl<'a> Results<'a> {
     /// When a journal cannot be read, and those of `found`, as ones of writing to `out`.
     pub(crate) fn each(
         &self,
-        mut found: impl FnMut(Vec<Cell>, f64) -> io::Result<()>,
+        mut found: impl FnMut(Vec<TableCell>, f64) -> io::Result<()>,
         out: &Path,
     ) -> Result<u64, SweepError> {
         let study = self.study;
@@ -83,7 +83,7 @@ impl<'a> Results<'a> {
             for (index, (point, key)) in (begin..end).zip(ready) {
                 let row = match key {
                     Ok(key) => rows.get(key)?,
-                    Err(why) => Some(Row {
+                    Err(why) => Some(StudyRow {
                         run_time_s: 0.0,
                         error: Some(why.to_string()),
                         cells: Vec::new(),
@@ -93,24 +93,24 @@ impl<'a> Results<'a> {
                     missing += 1;
                     continue;
                 };
-                let mut cells = vec![Cell::Whole(index as i64)];
+                let mut cells = vec![TableCell::Whole(index as i64)];
                 cells.extend(
                     study
                         .varied()
                         .zip(&point.values)
                         .map(|(v, value)| v.cell(value)),
                 );
-                if study.kind == Kind::Frame {
-                    cells.push(Cell::Whole(point.seed as i64));
+                if study.kind == StudyKind::Frame {
+                    cells.push(TableCell::Whole(point.seed as i64));
                 }
                 match row.error {
                     None => {
                         cells.extend(row.cells);
-                        cells.push(Cell::Empty);
+                        cells.push(TableCell::Empty);
                     }
                     Some(why) => {
-                        cells.extend(std::iter::repeat_n(Cell::Empty, results.len()));
-                        cells.push(Cell::Word(why));
+                        cells.extend(std::iter::repeat_n(TableCell::Empty, results.len()));
+                        cells.push(TableCell::Word(why));
                     }
                 }
                 found(cells, row.run_time_s).map_err(|e| InputError::unwritable(out, &e))?;
@@ -124,26 +124,32 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// As those of `Results::each`.
-    pub fn write(&self, folder: &Path, mut also: impl FnMut(&[Cell])) -> Result<u64, SweepError> {
+    pub fn write(
+        &self,
+        folder: &Path,
+        mut also: impl FnMut(&[TableCell]),
+    ) -> Result<u64, SweepError> {
         let columns = columns(self.study);
         let mut csv = OutputFile::create(&folder.join(CSV))?;
         let mut times = match self.study.kind {
-            Kind::Frame => Some(OutputFile::create(&folder.join(TIMES))?),
-            Kind::Theory => None,
+            StudyKind::Frame => Some(OutputFile::create(&folder.join(TIMES))?),
+            StudyKind::Theory => None,
         };
         let failed = |e| InputError::unwritable(folder, &e);
         let parquet = OutputFile::create(&folder.join(PARQUET))?;
         let mut parquet = Parquet::begin(parquet, &columns).map_err(failed)?;
-        let names = columns.iter().map(|column| Cell::Word(column.name.clone()));
+        let names = columns
+            .iter()
+            .map(|column| TableCell::Word(column.name.clone()));
         write_line(&mut csv, names).map_err(failed)?;
         if let Some(times) = &mut times {
-            let names = ["point", "run_time_s"].map(|name| Cell::Word(name.into()));
+            let names = ["point", "run_time_s"].map(|name| TableCell::Word(name.into()));
             write_line(times, names).map_err(failed)?;
         }
-        let write = |cells: Vec<Cell>, run_time_s| {
+        let write = |cells: Vec<TableCell>, run_time_s| {
             write_line(&mut csv, &cells)?;
             if let Some(times) = &mut times {
-                write_line(times, [&cells[0], &Cell::Number(run_time_s)])?;
+                write_line(times, [&cells[0], &TableCell::Number(run_time_s)])?;
             }
             also(&cells);
             parquet.push(cells)
@@ -156,7 +162,7 @@ impl<'a> Results<'a> {
     }
 }
 
-fn write_line<C: std::borrow::Borrow<Cell>>(
+fn write_line<C: std::borrow::Borrow<TableCell>>(
     out: &mut impl io::Write,
     cells: impl IntoIterator<Item = C>,
 ) -> io::Result<()> {

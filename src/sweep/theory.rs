@@ -4,7 +4,7 @@
 //! pulse, a Gaussian error of the guide, a window centred on its estimate as nearly as start values allow. The pulse fills bins as it falls
 //! on them ([`SpreadEcho`]); the Gaussian models put the share of its fullest bin into one.
 
-use super::cell::{Cell, Column, Holds};
+use super::cell::{Column, Holds, TableCell};
 use crate::chip::{SensorConfig, Tdc};
 use crate::photon::PhotonBudget;
 use crate::scene::Scene;
@@ -12,7 +12,7 @@ use crate::settings::Range::{Above, Within};
 use crate::settings::{keys, words};
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::design::share_inside;
-use crate::theory::detection::{Detection, Model, PerCycle, probability};
+use crate::theory::detection::{Detection, DetectionModel, PerCycle, probability};
 use crate::theory::precision::{cramer_rao, range_m, thompson};
 use crate::theory::spread_echo::{Hits, SpreadEcho};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -35,7 +35,7 @@ words! {
 
 keys! {
     /// Settings of theory.
-    pub(super) struct Asked {
+    pub(super) struct TheorySettings {
         /// Range of the wall; 50 if left out.
         range_m: f64 ["m"] = 50.0, in Above(0.0, 1e5);
         /// Its reflectivity; 0.3 if left out.
@@ -109,7 +109,7 @@ impl Rig {
 
 /// What has just been computed.
 #[derive(Debug, Default)]
-pub(super) struct Last {
+pub(super) struct TheoryCache {
     /// Of a wall without its guide.
     detection: Option<(Wall, Detection, Option<f64>)>,
     /// Of a wall in one laser cycle; precision goes with the root of their number.
@@ -129,7 +129,7 @@ pub(super) struct Wall {
 }
 
 impl Wall {
-    pub(super) fn new(mut rig: Rig, asked: &Asked) -> Self {
+    pub(super) fn new(mut rig: Rig, asked: &TheorySettings) -> Self {
         rig.illuminance_klux = asked.illuminance_klux.unwrap_or(rig.illuminance_klux);
         Wall {
             rig,
@@ -144,7 +144,7 @@ impl Wall {
 
     /// The results. `last` makes those of a wall that differs from the one before in the guide alone, or in laser cycles, cheap: the bound
     /// takes an integral, detection and the search for laser cycles a sum.
-    pub(super) fn results(&self, last: &mut Last) -> Vec<Cell> {
+    pub(super) fn results(&self, last: &mut TheoryCache) -> Vec<TableCell> {
         let Wall { rig, .. } = self;
         let (bin_s, cycles) = (rig.bin_s, self.laser_cycles as f64);
         let background_hz = (rig.budget).background_hz(self.reflectivity, rig.illuminance_klux);
@@ -210,7 +210,7 @@ impl Wall {
             Some(in_window),
             Some(in_window * detection.probability),
         ]
-        .map(Cell::maybe)
+        .map(TableCell::maybe)
         .into()
     }
 
@@ -242,8 +242,8 @@ impl Wall {
         let (found, needed) = match self.model {
             Counts::Bernoulli => spread(Hits::OneACycle),
             Counts::Poisson => spread(Hits::All),
-            Counts::Gaussian => in_one_bin(Model::Gaussian),
-            Counts::GaussianAsPrinted => in_one_bin(Model::GaussianAsPrinted),
+            Counts::Gaussian => in_one_bin(DetectionModel::Gaussian),
+            Counts::GaussianAsPrinted => in_one_bin(DetectionModel::GaussianAsPrinted),
         };
         let cycles = |cycles: Option<u64>| cycles.map_or(f64::INFINITY, |cycles| cycles as f64);
         (found, needed.map(cycles))
@@ -256,7 +256,7 @@ mod tests {
     use rand_philox::Philox;
 
     use crate::chip::{hslidar, hslidar_delay_line};
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
     use crate::settings::Settings;
 
     #[test]
@@ -266,46 +266,60 @@ mod tests {
             Wall::new(rig, &toml::from_str(asked).unwrap())
         };
         let usual = wall("");
-        for key in Asked::KEYS {
+        for key in TheorySettings::KEYS {
             let asked = match key.name {
                 "model" => "model = \"poisson\"".to_owned(),
                 name => format!("{name} = 0.9").replace("laser_cycles = 0.9", "laser_cycles = 9"),
             };
             assert_ne!(wall(&asked), usual, "{} changes nothing", key.name);
         }
-        assert_eq!(usual.results(&mut Last::default()).len(), columns().len());
+        assert_eq!(
+            usual.results(&mut TheoryCache::default()).len(),
+            columns().len()
+        );
     }
 
     #[test]
     fn results_are_those_of_the_formulas() {
         let (sensor, scene) = (SensorConfig::default(), Scene::outdoor());
-        let asked = Asked {
+        let asked = TheorySettings {
             range_m: 120.0,
             goal_detection: Some(0.99),
-            ..Asked::default()
+            ..TheorySettings::default()
         };
         let wall = Wall::new(Rig::new(&sensor, &scene), &asked);
-        let results = wall.results(&mut Last::default());
-        let of = |name: &str| {
+        let results = wall.results(&mut TheoryCache::default());
+        let number = |name: &str| {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             results[at].number().unwrap()
         };
         let budget = scene.photon_budget(64, 64);
-        assert_eq!(of("signal_per_cycle"), budget.signal_per_pulse(120.0, 0.3));
-        assert!((of("p_detection") + of("p_miss") - 1.0).abs() < 1e-12);
-        assert_eq!(of("p_right"), of("p_detection") * of("share_in_window"));
-        assert!(of("precision_thompson_m") > 0.0 && of("precision_bound_m") > 0.0);
-        assert!((of("window_m") - 16.0 * of("bin_m")).abs() < 1e-12);
+        assert_eq!(
+            number("signal_per_cycle"),
+            budget.signal_per_pulse(120.0, 0.3)
+        );
+        assert!((number("p_detection") + number("p_miss") - 1.0).abs() < 1e-12);
+        assert_eq!(
+            number("p_right"),
+            number("p_detection") * number("share_in_window")
+        );
+        assert!(number("precision_thompson_m") > 0.0 && number("precision_bound_m") > 0.0);
+        assert!((number("window_m") - 16.0 * number("bin_m")).abs() < 1e-12);
 
         let longer = Wall {
-            laser_cycles: of("laser_cycles_for_goal") as u64,
+            laser_cycles: number("laser_cycles_for_goal") as u64,
             ..wall
         };
         let at = columns()
             .iter()
             .position(|c| c.name == "p_detection")
             .unwrap();
-        assert!(longer.results(&mut Last::default())[at].number().unwrap() >= 0.99);
+        assert!(
+            longer.results(&mut TheoryCache::default())[at]
+                .number()
+                .unwrap()
+                >= 0.99
+        );
     }
 
     /// 200 MHz and steps of four periods; elements of 2.6 ns and steps of 12.5 ns (thesis Tables 11 and 14); both of 7 bits.
@@ -314,36 +328,39 @@ mod tests {
         let scene = Scene::outdoor();
         for (sensor, bin_ns, step_ns) in [(hslidar(), 5.0, 20.0), (hslidar_delay_line(), 2.6, 12.5)]
         {
-            let results = Wall::new(Rig::new(&sensor, &scene), &Asked::default())
-                .results(&mut Last::default());
-            let of = |name: &str| {
+            let results = Wall::new(Rig::new(&sensor, &scene), &TheorySettings::default())
+                .results(&mut TheoryCache::default());
+            let number = |name: &str| {
                 let at = columns().iter().position(|c| c.name == name).unwrap();
                 results[at].number().unwrap()
             };
             let metres = |ns: f64| 0.5e-9 * ns * SPEED_OF_LIGHT_M_PER_S;
-            assert!((of("bin_m") - metres(bin_ns)).abs() < 1e-9);
-            assert!((of("window_m") - metres(8.0 * bin_ns)).abs() < 1e-9);
-            assert!((of("reach_m") - metres(128.0 * step_ns)).abs() < 1e-9);
+            assert!((number("bin_m") - metres(bin_ns)).abs() < 1e-9);
+            assert!((number("window_m") - metres(8.0 * bin_ns)).abs() < 1e-9);
+            assert!((number("reach_m") - metres(128.0 * step_ns)).abs() < 1e-9);
         }
     }
 
     #[test]
     fn what_was_computed_before_changes_nothing() {
-        let mut last = Last::default();
+        let mut last = TheoryCache::default();
         let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
         for range_m in [20.0, 150.0] {
             for laser_cycles in [100, 1000] {
                 for model in [Counts::Bernoulli, Counts::Gaussian] {
                     for guide_sigma_m in [0.5, 2.0] {
-                        let asked = Asked {
+                        let asked = TheorySettings {
                             range_m,
                             laser_cycles,
                             model,
                             guide_sigma_m,
-                            ..Asked::default()
+                            ..TheorySettings::default()
                         };
                         let wall = Wall::new(rig, &asked);
-                        assert_eq!(wall.results(&mut last), wall.results(&mut Last::default()));
+                        assert_eq!(
+                            wall.results(&mut last),
+                            wall.results(&mut TheoryCache::default())
+                        );
                     }
                 }
             }
@@ -352,14 +369,14 @@ mod tests {
 
     #[test]
     fn a_black_wall_has_no_precision_and_is_found_by_chance() {
-        let asked = Asked {
+        let asked = TheorySettings {
             reflectivity: 0.0,
-            ..Asked::default()
+            ..TheorySettings::default()
         };
         let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
         let wall = Wall::new(rig, &asked);
-        let results = wall.results(&mut Last::default());
-        assert_eq!(results[4], Cell::Empty);
+        let results = wall.results(&mut TheoryCache::default());
+        assert_eq!(results[4], TableCell::Empty);
         // The echo's bin and its neighbour.
         assert!((results[2].number().unwrap() - 2.0 / 16.0).abs() < 1e-9);
     }
@@ -367,29 +384,30 @@ mod tests {
     /// Pulses of 1, 2 and 4.5 ns gave the same; beyond the reach windows held the wall.
     #[test]
     fn longer_pulses_are_found_less_often_and_walls_beyond_the_reach_never() {
-        let of = |fwhm_ns: f64, range_m: f64, name: &str| {
+        let number = |fwhm_ns: f64, range_m: f64, name: &str| {
             let mut scene = Scene::outdoor();
             scene.lidar.pulse_fwhm_ns = fwhm_ns;
-            let asked = Asked {
+            let asked = TheorySettings {
                 range_m,
                 reflectivity: 0.1,
                 illuminance_klux: Some(100.0),
                 laser_cycles: 200,
-                ..Asked::default()
+                ..TheorySettings::default()
             };
             let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
             let at = columns().iter().position(|c| c.name == name).unwrap();
-            wall.results(&mut Last::default())[at].number()
+            wall.results(&mut TheoryCache::default())[at].number()
         };
-        let [short, usual, long] = [1.0, 2.0, 4.5].map(|fwhm_ns| of(fwhm_ns, 200.0, "p_detection"));
+        let [short, usual, long] =
+            [1.0, 2.0, 4.5].map(|fwhm_ns| number(fwhm_ns, 200.0, "p_detection"));
         assert!(
             short > usual && usual > long,
             "{short:?} {usual:?} {long:?}"
         );
-        let reach_m = of(2.0, 1.0, "reach_m").unwrap();
-        assert_eq!(of(2.0, 1.01 * reach_m, "p_right"), Some(0.0));
+        let reach_m = number(2.0, 1.0, "reach_m").unwrap();
+        assert_eq!(number(2.0, 1.01 * reach_m, "p_right"), Some(0.0));
         // Too far away for a precision: empty, not 1.7e199.
-        assert_eq!(of(2.0, 1e5, "precision_bound_m"), None);
+        assert_eq!(number(2.0, 1e5, "precision_bound_m"), None);
     }
 
     fn uniform(random: &mut Philox) -> f64 {
@@ -414,25 +432,28 @@ mod tests {
         scene.lidar.pulse_fwhm_ns = 1.0;
         scene.lidar.spad_jitter_fwhm_ps = 3000.0;
         scene.lidar.trigger_jitter_ps = 1500.0;
-        let asked = Asked {
+        let asked = TheorySettings {
             range_m: 150.0,
             reflectivity: 0.1,
             illuminance_klux: Some(50.0),
             laser_cycles: 15,
-            ..Asked::default()
+            ..TheorySettings::default()
         };
         let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
-        let results = wall.results(&mut Last::default());
-        let of = |name: &str| {
+        let results = wall.results(&mut TheoryCache::default());
+        let number = |name: &str| {
             let at = columns().iter().position(|c| c.name == name).unwrap();
             results[at].number().unwrap()
         };
-        let (signal, background) = (of("signal_per_cycle"), of("background_per_bin_cycle"));
+        let (signal, background) = (
+            number("signal_per_cycle"),
+            number("background_per_bin_cycle"),
+        );
         let bin_ns = 1e9 * wall.rig.bin_s;
         let widths_ns = [1.0 * TO_SIGMA, 3.0 * TO_SIGMA, 1.5];
         let fwhm_ns = widths_ns.map(|ns| ns * ns).iter().sum::<f64>().sqrt() / TO_SIGMA;
         let within = (0.5 * fwhm_ns / bin_ns).max(1.0);
-        let mut random = random_stream(5, Purpose::Photons, 0, 0);
+        let mut random = random_stream(5, RandomPurpose::Photons, 0, 0);
         let mut right = 0;
         let trials = 3000;
         for _ in 0..trials {
@@ -461,7 +482,7 @@ mod tests {
             let winner = tied[random.next_u32() as usize % tied.len()];
             right += u32::from((winner as f64 + 0.5 - at).abs() <= within);
         }
-        let (share, expected) = (f64::from(right) / f64::from(trials), of("p_detection"));
+        let (share, expected) = (f64::from(right) / f64::from(trials), number("p_detection"));
         let deviation = (expected * (1.0 - expected) / f64::from(trials)).sqrt();
         assert!((0.3..0.95).contains(&expected), "{expected} tells little");
         assert!(

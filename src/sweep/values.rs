@@ -2,7 +2,7 @@
 
 use toml::Value;
 
-use super::cell::{Cell, Column};
+use super::cell::{Column, TableCell};
 
 /// Values of one key.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,12 +10,12 @@ pub(super) enum Values {
     /// These, in order.
     List(Vec<Value>),
     /// Numbers between two.
-    Range(Span),
+    Range(ValueSpan),
 }
 
 /// Numbers from one to another.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Span {
+pub(super) struct ValueSpan {
     pub(super) from: f64,
     pub(super) to: f64,
     /// How many, both ends included; not needed where a design draws values.
@@ -26,10 +26,10 @@ pub(super) struct Span {
     pub(super) is_whole: bool,
 }
 
-impl Span {
+impl ValueSpan {
     /// The value at a share of the way, 0 to 1.
-    fn at(&self, share: f64) -> Value {
-        let Span { from, to, .. } = *self;
+    fn value(&self, share: f64) -> Value {
+        let ValueSpan { from, to, .. } = *self;
         // The ends are what was written, to the bit.
         let number = match share {
             0.0 => from,
@@ -47,7 +47,7 @@ impl Span {
 
 /// A key that varies.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Varied {
+pub(super) struct VariedKey {
     /// Its whole name, as `sensor.clk_hz`.
     pub(super) name: String,
     pub(super) values: Values,
@@ -55,7 +55,7 @@ pub(super) struct Varied {
     pub(super) column: Column,
 }
 
-impl Varied {
+impl VariedKey {
     /// How many values it has, where that is a number.
     pub(super) fn len(&self) -> Option<u64> {
         match &self.values {
@@ -69,8 +69,8 @@ impl Varied {
         match &self.values {
             Values::List(list) => list[index as usize].clone(),
             Values::Range(span) => match span.steps.map(u64::from) {
-                None | Some(1) => span.at(0.0),
-                Some(steps) => span.at(index as f64 / (steps - 1) as f64),
+                None | Some(1) => span.value(0.0),
+                Some(steps) => span.value(index as f64 / (steps - 1) as f64),
             },
         }
     }
@@ -82,18 +82,18 @@ impl Varied {
                 let index = (share * list.len() as f64) as usize;
                 list[index.min(list.len() - 1)].clone()
             }
-            Values::Range(span) => span.at(share),
+            Values::Range(span) => span.value(share),
         }
     }
 
-    pub(super) fn cell(&self, value: &Value) -> Cell {
-        Cell::of(value, self.column.holds)
+    pub(super) fn cell(&self, value: &Value) -> TableCell {
+        TableCell::from_value(value, self.column.holds)
     }
 }
 
 /// Keys that vary together, the first values of all, then the second ones, and so on.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axis(pub(super) Vec<Varied>);
+pub(super) struct Axis(pub(super) Vec<VariedKey>);
 
 impl Axis {
     /// How many values each of its keys has, where that is a number.

@@ -83,7 +83,7 @@ impl<'p> Aims<'p> {
 }
 
 /// A macropixel's histogram, as far as ranging knows it.
-pub(super) struct Place<'a> {
+pub(super) struct AimedHistogram<'a> {
     pub(super) pixel: usize,
     pub(super) start: u16,
     pub(super) law: &'a WindowLaw,
@@ -91,7 +91,7 @@ pub(super) struct Place<'a> {
     pub(super) peak: &'a PeakOptions,
 }
 
-impl Place<'_> {
+impl AimedHistogram<'_> {
     /// The echo in `counts`.
     pub(super) fn find(&self, finder: &EchoFinder, counts: &[u32]) -> Option<Sighting> {
         match self.profile {

@@ -8,7 +8,7 @@
 //!
 //! Every step is an exposure of its own on the window engine, with photons of its own. One even and one odd window are swept: others
 //! differ from them by whole steps of CLK. [`Sweep::every_window`] sweeps all and takes the mean of what each finds, which is
-//! also the proof of that: [`Calibrated::largest_difference`] is of the order of a step.
+//! also the proof of that: [`BinCalibration::largest_difference`] is of the order of a step.
 
 use rayon::prelude::*;
 
@@ -38,7 +38,7 @@ pub struct Sweep {
 
 /// What a sweep has found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Calibrated {
+pub struct BinCalibration {
     /// The bins of every macropixel: means over its even and over its odd windows that were swept.
     pub profile: BinProfile,
     /// Even and odd windows of a macropixel that were swept.
@@ -75,7 +75,7 @@ pub fn calibrate(
     stop_periods: u32,
     sweep: &Sweep,
     swept: impl Fn() + Sync,
-) -> Result<Calibrated, SweepError> {
+) -> Result<BinCalibration, BinSweepError> {
     assert_eq!(
         sensor.tdc,
         Tdc::DelayLine,
@@ -84,13 +84,13 @@ pub fn calibrate(
     let exposure = Exposure::new(sensor, stop_periods, sweep.laser_cycles);
     let law = WindowLaw::new(sensor, &exposure);
     let starts = [0, 1].map(|parity| {
-        let seen = seen(sensor, &exposure, parity);
+        let seen = swept_starts(sensor, &exposure, parity);
         let wanted = if sweep.every_window { usize::MAX } else { 1 };
         seen.take(wanted).collect::<Vec<u16>>()
     });
     for (starts, is_odd) in starts.iter().zip([false, true]) {
         if starts.is_empty() {
-            return Err(SweepError::NoWindow { is_odd });
+            return Err(BinSweepError::NoWindow { is_odd });
         }
     }
     let sweeping = Sweeping {
@@ -99,9 +99,9 @@ pub fn calibrate(
         exposure: &exposure,
     };
     // What is looked for is how far the windows of one line differ by anything but whole steps.
-    let line = |pixel: usize, starts: &[u16]| -> Result<(LineProfile, f64), SweepError> {
+    let line = |pixel: usize, starts: &[u16]| -> Result<(LineProfile, f64), BinSweepError> {
         let law = law.of_macropixel(pixel as u32);
-        let lines: Result<Vec<LineProfile>, SweepError> = (0..)
+        let lines: Result<Vec<LineProfile>, BinSweepError> = (0..)
             .zip(starts)
             .map(|(nth, &start)| {
                 let mut line = sweeping.line(&law, pixel, start, nth)?;
@@ -115,7 +115,7 @@ pub fn calibrate(
             .collect();
         Ok(mean(&lines?))
     };
-    let macropixels: Result<Vec<_>, SweepError> = (0..sensor.pixels())
+    let macropixels: Result<Vec<_>, BinSweepError> = (0..sensor.pixels())
         .into_par_iter()
         .map(|pixel| {
             let lines = [line(pixel, &starts[0])?, line(pixel, &starts[1])?];
@@ -131,7 +131,7 @@ pub fn calibrate(
         })
     });
     let macropixels = macropixels.collect();
-    Ok(Calibrated {
+    Ok(BinCalibration {
         profile: BinProfile {
             sensor: (**sensor).clone(),
             starts: [starts[0][0], starts[1][0]],
@@ -157,7 +157,7 @@ impl Sweeping<'_> {
         pixel: usize,
         start: u16,
         nth: u64,
-    ) -> Result<LineProfile, SweepError> {
+    ) -> Result<LineProfile, BinSweepError> {
         let Sweeping {
             sensor,
             sweep,
@@ -200,14 +200,14 @@ impl Sweeping<'_> {
 
 /// The mean of several profiles of one line, and how far a middle of theirs is from its mean at most, s.
 fn mean(lines: &[LineProfile]) -> (LineProfile, f64) {
-    let of = |values: fn(&LineProfile) -> &[f64]| -> Vec<f64> {
+    let means = |values: fn(&LineProfile) -> &[f64]| -> Vec<f64> {
         let bins = values(&lines[0]).len();
         let sum = |bin: usize| lines.iter().map(|line| values(line)[bin]).sum::<f64>();
         (0..bins).map(|bin| sum(bin) / lines.len() as f64).collect()
     };
     let mean = LineProfile {
-        middle_s: of(|line| &line.middle_s),
-        length_s: of(|line| &line.length_s),
+        middle_s: means(|line| &line.middle_s),
+        length_s: means(|line| &line.length_s),
     };
     let differences = lines.iter().flat_map(|line| {
         let pairs = line.middle_s.iter().zip(&mean.middle_s);
@@ -219,7 +219,7 @@ fn mean(lines: &[LineProfile]) -> (LineProfile, f64) {
 
 /// Why bins cannot be swept.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SweepError {
+pub enum BinSweepError {
     /// The window engine refuses.
     #[error(transparent)]
     Engine(#[from] EngineError),
@@ -236,7 +236,7 @@ pub enum SweepError {
 
 /// The even (`parity` 0) or odd (1) start values whose windows lie within the laser cycle and after the laser's trigger, by half a
 /// line for mismatch.
-fn seen(sensor: &Sensor, exposure: &Exposure, parity: u16) -> impl Iterator<Item = u16> {
+fn swept_starts(sensor: &Sensor, exposure: &Exposure, parity: u16) -> impl Iterator<Item = u16> {
     let law = WindowLaw::new(sensor.alike(), exposure);
     let half = Time::from_fs(sensor.longest_delay_line().as_fs() / 4);
     let end = exposure.stop(1) - exposure.stop(0) - half;

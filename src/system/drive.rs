@@ -28,20 +28,20 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-pub use reuse::Reused;
+pub use reuse::DriveReuse;
 pub use settings::{DriveSettings, FrameClock, FrameTimes, Noise};
-pub use state::Drive;
+pub use state::DriveSimulation;
 
 use rayon::prelude::*;
 
-use self::reuse::{Last, Same, Spent};
+use self::reuse::{PreviousFrame, Spent, UnchangedPixels};
 use super::error::FrameError;
-use super::frame::go_on;
+use super::frame::check_not_stopped;
 use super::pixel::PixelDepth;
 use super::result::PhaseTimes;
 use super::stopwatch::Stopwatch;
-use super::summary::Summary;
-use crate::engine::{Answer, Histograms, Work};
+use super::summary::FrameSummary;
+use crate::engine::{Answer, EngineWork, Histograms};
 use crate::guide::{GuideMap, PastFrame};
 use crate::scene::GroundTruth;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -73,21 +73,21 @@ pub struct DriveFrame {
     /// Light's way there and back in one bin, as a distance, m.
     pub bin_m: f64,
     /// What the engine did, without what was reused.
-    pub work: Work,
+    pub work: EngineWork,
     /// What was left out.
-    pub reused: Reused,
+    pub reused: DriveReuse,
     /// What the simulation took.
     pub run_times: PhaseTimes,
 }
 
 impl DriveFrame {
     /// The frame in a few numbers.
-    pub fn summary(&self) -> Summary {
-        Summary::new(&self.pixels, self.bin_m)
+    pub fn summary(&self) -> FrameSummary {
+        FrameSummary::new(&self.pixels, self.bin_m)
     }
 }
 
-impl Drive<'_> {
+impl DriveSimulation<'_> {
     /// Takes the next frame; `exposed` is called with macropixels as they are done, and may stop the frame by its
     /// answer. After a frame that fails, the next one has nothing to reuse.
     ///
@@ -104,11 +104,11 @@ impl Drive<'_> {
         let light = self.light(&plan, before, &mut spent);
 
         let mut clock = Stopwatch::new();
-        let same = Same::of(
+        let same = UnchangedPixels::new(
             before.filter(|_| self.settings.noise == Noise::Still),
             &light,
         );
-        go_on(exposed(same.number()))?;
+        check_not_stopped(exposed(same.number()))?;
         spent.reused.load = before.is_some_and(|last| last.starts == plan.starts);
         spent.reused.macropixels = same.number();
         let (histograms, work) =
@@ -142,7 +142,7 @@ impl Drive<'_> {
             reused: spent.reused,
             run_times: spent.run,
         };
-        self.last = Some(Last {
+        self.last = Some(PreviousFrame {
             starts: plan.starts,
             light,
             histograms,

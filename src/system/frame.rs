@@ -12,19 +12,19 @@ use rayon::prelude::*;
 
 use self::at_gates::AtGates;
 use super::error::FrameError;
-use super::light::{light_in, lit, photon_stream, starts_of, truth_in};
+use super::light::{light_in, lit_pixels, photon_stream, starts_of, truth_in};
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
-use super::ranger::{Known, Ranger};
+use super::ranger::{PixelContext, Ranger};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
-use super::settings::{EngineKind, FrameSettings, Probe};
-use super::shared::{Look, SharedWork};
+use super::settings::{EngineKind, FrameSettings, GateProbe};
+use super::shared::{SharedView, SharedWork};
 use super::stopwatch::{Stopwatch, timed};
-use super::tolerance::{Kept, Tolerance};
+use super::tolerance::{Tolerance, ToleranceResult};
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::{
-    Answer, Cohort, EngineError, Exposed, LitPixel, PulsedPixel, Replay, Window, expose,
+    Answer, Cohort, EngineError, ExposureResult, LitPixel, PulsedPixel, Replay, Window, expose,
     expose_without_skipping, load,
 };
 use crate::guide::{GuideInput, GuideMap};
@@ -45,7 +45,7 @@ mod tests;
 /// A guide without a map, and what [`take_guided_frame`] reports.
 pub fn take_frame<A: Answer>(
     settings: &FrameSettings,
-    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     take_frame_by(settings, WindowPolicy::default(), probes, exposed)
@@ -58,7 +58,7 @@ pub fn take_frame<A: Answer>(
 pub fn take_frame_by<A: Answer>(
     settings: &FrameSettings,
     policy: WindowPolicy,
-    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let FrameSettings {
@@ -74,7 +74,7 @@ pub fn take_frame_by<A: Answer>(
     let input = GuideInput::still(scene, rows, cols, *seed);
     let guide = settings.guide.estimate(&input)?;
     let guide_s = clock.lap();
-    go_on(exposed(0))?;
+    check_not_stopped(exposed(0))?;
     let mut pointing = Pointing::new(policy, sensor, exposure, calibration.as_ref());
     let wanted = pointing.windows(&guide, &[]);
     let windows_s = clock.lap();
@@ -94,7 +94,7 @@ pub(crate) fn take_shared_frame<A: Answer>(
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let mut clock = Stopwatch::new();
-    let look = shared.look(settings);
+    let look = shared.shared_look(settings);
     let Some(guided) = look.windows(settings, policy)? else {
         return take_frame_by(settings, policy, |_| Vec::new(), exposed);
     };
@@ -106,7 +106,7 @@ pub(crate) fn take_shared_frame<A: Answer>(
         wanted,
         shared: Some((shared, &look)),
     };
-    let mut frame = plan.take(|_| Vec::new(), exposed)?;
+    let mut frame = plan.expose(|_| Vec::new(), exposed)?;
     frame.times.guide_s = guide_s;
     Ok(frame)
 }
@@ -124,7 +124,7 @@ pub fn take_guided_frame<A: Answer>(
     settings: &FrameSettings,
     guide: &GuideMap,
     wanted: &[Option<u16>],
-    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let sensor = &settings.sensor;
@@ -136,7 +136,7 @@ pub fn take_guided_frame<A: Answer>(
         wanted,
         shared: None,
     };
-    plan.take(probes, exposed)
+    plan.expose(probes, exposed)
 }
 
 /// A frame whose windows are chosen.
@@ -145,7 +145,7 @@ struct Plan<'a> {
     guide: &'a GuideMap,
     wanted: &'a [Option<u16>],
     /// What frames share, and what of it those with this look do.
-    shared: Option<(&'a SharedWork, &'a Arc<Look>)>,
+    shared: Option<(&'a SharedWork, &'a Arc<SharedView>)>,
 }
 
 /// What is there, and what of it falls on the array.
@@ -157,14 +157,14 @@ struct Light {
 }
 
 /// What an engine counted, what a tolerance kept to, and how long it took.
-struct Counted {
-    exposed: Exposed,
-    kept: Option<Kept>,
+struct FrameCounts {
+    exposed: ExposureResult,
+    kept: Option<ToleranceResult>,
     took_s: f64,
 }
 
 /// What the counts say, and how long it took to tell.
-struct Ranged {
+struct FrameDepths {
     depths: Vec<PixelDepth>,
     bin_s: f64,
     remark: Option<String>,
@@ -183,9 +183,9 @@ impl Light {
 }
 
 impl Plan<'_> {
-    fn take<A: Answer>(
+    fn expose<A: Answer>(
         &self,
-        probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+        probes: impl FnOnce(&GuideMap) -> Vec<GateProbe>,
         exposed: impl Fn(usize) -> A + Sync,
     ) -> Result<Frame, FrameError> {
         let (sensor, exposure) = (&self.settings.sensor, &self.settings.exposure);
@@ -213,7 +213,7 @@ impl Plan<'_> {
         let load_time = load_time?;
         let (counted, ranged) = measured?;
         let probed = probed?;
-        self.judge(&counted, &probed)?;
+        self.compare_probes(&counted, &probed)?;
 
         Ok(Frame {
             rows: sensor.rows,
@@ -255,7 +255,7 @@ impl Plan<'_> {
         };
         Light {
             truth,
-            pixels: lit(&s.sensor, self.wanted, &each),
+            pixels: lit_pixels(&s.sensor, self.wanted, &each),
             stream,
             each,
         }
@@ -279,7 +279,7 @@ impl Plan<'_> {
         &self,
         light: &Light,
         done: &(impl Fn(usize) -> A + Sync),
-    ) -> Result<Counted, FrameError> {
+    ) -> Result<FrameCounts, FrameError> {
         let FrameSettings {
             sensor,
             exposure,
@@ -322,21 +322,21 @@ impl Plan<'_> {
                 expose_without_skipping(&*engine, stream, pixels, done)?
             }
         };
-        Ok(Counted {
+        Ok(FrameCounts {
             exposed,
             kept,
             took_s: clock.lap(),
         })
     }
 
-    fn range(&self, light: &Light, counted: &Counted) -> Result<Ranged, FrameError> {
+    fn range(&self, light: &Light, counted: &FrameCounts) -> Result<FrameDepths, FrameError> {
         let s = self.settings;
         let mut clock = Stopwatch::new();
         let calibration = s.calibration.as_ref();
         let ranger = Ranger::new(&s.sensor, &s.exposure, &s.scene, &s.depth, calibration)?;
         let counts = counted.exposed.histograms.counts();
         let depths = ranger.of_array(counts, |pixel, counts| {
-            let known = Known {
+            let known = PixelContext {
                 pixel,
                 start: self.wanted[pixel],
                 true_m: light.truth.range_m[pixel],
@@ -353,7 +353,7 @@ impl Plan<'_> {
             light: &light.each,
             pixels: &depths,
         };
-        Ok(Ranged {
+        Ok(FrameDepths {
             remark: circumstances.remark(),
             hints: circumstances.hints(),
             bin_s: ranger.bin_s(),
@@ -365,12 +365,12 @@ impl Plan<'_> {
     fn probe<A: Answer>(
         &self,
         light: &Light,
-        probes: &[Probe],
+        probes: &[GateProbe],
         done: &(impl Fn(usize) -> A + Sync),
     ) -> Result<Vec<AtGates>, FrameError> {
         let s = self.settings;
         let run = |probe| {
-            go_on(done(0))?;
+            check_not_stopped(done(0))?;
             AtGates::run(s, &light.stream, &light.pixels, probe)
         };
         probes.par_iter().map(run).collect()
@@ -381,7 +381,7 @@ impl Plan<'_> {
     ///
     /// # Errors
     /// The first disagreement.
-    fn judge(&self, counted: &Counted, probed: &[AtGates]) -> Result<(), FrameError> {
+    fn compare_probes(&self, counted: &FrameCounts, probed: &[AtGates]) -> Result<(), FrameError> {
         let s = self.settings;
         let has_tolerance = counted.kept.is_some();
         let engine = s.engine.of_probes(has_tolerance);
@@ -426,7 +426,7 @@ impl Plan<'_> {
 ///
 /// # Errors
 /// When it is not.
-pub(super) fn go_on(answer: impl Answer) -> Result<(), EngineError> {
+pub(super) fn check_not_stopped(answer: impl Answer) -> Result<(), EngineError> {
     if answer.stops() {
         Err(EngineError::Stopped)
     } else {

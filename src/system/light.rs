@@ -19,7 +19,11 @@ pub fn photon_stream(
 /// What is really there for every macropixel in the middle of an exposure that begins at time 0 of the scene.
 pub(super) fn truth_in(sensor: &SensorConfig, exposure: &Exposure, scene: &Scene) -> GroundTruth {
     let middle_s = 0.5 * exposure.end().as_s();
-    GroundTruth::render(&scene.at(middle_s), sensor.rows as u32, sensor.cols as u32)
+    GroundTruth::render(
+        &scene.snapshot(middle_s),
+        sensor.rows as u32,
+        sensor.cols as u32,
+    )
 }
 
 /// The light of an exposure on every macropixel, in the order of `truth`, on the SPADs of `stream`.
@@ -46,7 +50,7 @@ pub(super) fn starts_of(sensor: &SensorConfig, wanted: &[Option<u16>]) -> Vec<u1
 }
 
 /// Every macropixel of the array with its start value and, where its SPADs are on, its light.
-pub(super) fn lit(
+pub(super) fn lit_pixels(
     sensor: &SensorConfig,
     wanted: &[Option<u16>],
     light: &[PixelLight],

@@ -26,25 +26,27 @@ mod taken;
 mod tolerance;
 mod worlds;
 
-pub use calibrate::{Calibrated, Sweep, SweepError, calibrate};
+pub use calibrate::{BinCalibration, BinSweepError, Sweep, calibrate};
 pub use distance::DistanceLaw;
-pub use drive::{Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, Noise, Reused};
+pub use drive::{
+    DriveFrame, DriveReuse, DriveSettings, DriveSimulation, FrameClock, FrameTimes, Noise,
+};
 pub use error::FrameError;
 pub(crate) use frame::take_shared_frame;
 pub use frame::{take_frame, take_frame_by, take_guided_frame};
 pub use light::photon_stream;
 pub(crate) use pixel::cloud;
-pub use pixel::{NoDepth, PixelDepth, RETURNS, Return, Returns};
+pub use pixel::{DepthReturn, DepthReturns, NoDepth, PixelDepth, RETURNS};
 pub use policy::{NoBins, Pointing, Unguided, Why, WindowPolicy};
-pub(crate) use ranger::{Known, Ranger};
+pub(crate) use ranger::{PixelContext, Ranger};
 pub use ranger::{Reading, check_counts, range_counts};
-pub use reranged::Ranged;
+pub use reranged::ArrayDepths;
 pub use result::{Frame, PhaseTimes};
-pub use settings::{EngineKind, FrameSettings, Probe};
+pub use settings::{EngineKind, FrameSettings, GateProbe};
 pub(crate) use shared::SharedWork;
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};
-pub use summary::Summary;
+pub use summary::FrameSummary;
 pub(crate) use summary::median;
 pub use taken::{TakenFrame, TakenPixel, TakenSettings};
-pub use tolerance::{Kept, OnWindow, Tolerance};
+pub use tolerance::{OnWindow, Tolerance, ToleranceResult};

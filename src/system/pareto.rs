@@ -22,12 +22,12 @@ use serde::Serialize;
 pub use errors::Errors;
 use method::MEASURED_PERIODS;
 pub use method::{GATE_CYCLES, Method};
-pub use summary::{Summary, Worst, summarise};
+pub use summary::{MethodSummary, Worst, summarise};
 
 use super::light::photon_stream;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{
-    Cohort, CohortOptions, Cycle, EngineError, Exposed, Gate, LitPixel, Window, expose,
+    Cohort, CohortOptions, Cycle, EngineError, ExposureResult, Gate, LitPixel, Window, expose,
     expose_without_skipping,
 };
 use crate::photon::{PhotonStream, PixelLight};
@@ -40,7 +40,7 @@ pub enum Done<'p> {
     /// All runs of a method on one wall.
     Wall,
     /// A method on every wall.
-    Method(&'p [Point]),
+    Method(&'p [ParetoPoint]),
 }
 
 /// What to compare.
@@ -70,7 +70,7 @@ pub struct ParetoSettings {
 
 /// One method on one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
+pub struct ParetoPoint {
     /// Engine and knob.
     pub method: Method,
     /// Range of the wall, m.
@@ -87,7 +87,7 @@ pub struct Point {
 
 /// A method's histograms of a wall.
 struct Run {
-    exposed: Exposed,
+    exposed: ExposureResult,
     /// Median wall-clock time for a macropixel and laser cycle.
     time_ns: f64,
 }
@@ -163,7 +163,7 @@ impl ParetoSettings {
         photon_stream(&self.sensor, &exposure, seed, &self.scene)
     }
 
-    fn run(&self, method: Method, cell: &Cell) -> Result<Exposed, EngineError> {
+    fn run(&self, method: Method, cell: &Cell) -> Result<ExposureResult, EngineError> {
         let (sensor, pixels) = (&self.sensor, &cell.pixels);
         let laser_cycles = self.cycles_of(method);
         let exposure = self.exposure(laser_cycles);
@@ -225,7 +225,7 @@ impl ParetoSettings {
         &self,
         methods: &[Method],
         mut done: impl FnMut(Done<'_>),
-    ) -> Result<Vec<Point>, EngineError> {
+    ) -> Result<Vec<ParetoPoint>, EngineError> {
         let cells = self.cells();
         let mut references = Vec::new();
         for cell in &cells {
@@ -270,7 +270,7 @@ impl ParetoSettings {
         cell: &Cell,
         run: &Run,
         reference: &Run,
-    ) -> Result<Point, EngineError> {
+    ) -> Result<ParetoPoint, EngineError> {
         let law = WindowLaw::new(&self.sensor, &self.exposure(1));
         let shorter;
         let exact = match method {
@@ -293,13 +293,13 @@ impl ParetoSettings {
         };
         // Fewer laser cycles take less time for the same exposure.
         let run_time_ns = run.time_ns / scale;
-        Ok(Point {
+        Ok(ParetoPoint {
             method,
             range_m: cell.range_m,
             illuminance_klux: cell.illuminance_klux,
             run_time_ns,
             speed_up: reference.time_ns / run_time_ns,
-            errors: Errors::between(&law, &cell.pixels, &run.exposed, exact, scale),
+            errors: Errors::compare(&law, &cell.pixels, &run.exposed, exact, scale),
         })
     }
 }

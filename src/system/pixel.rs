@@ -67,7 +67,7 @@ impl NoDepth {
 
 /// One echo of a macropixel's window. Distances are radial, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Return {
+pub struct DepthReturn {
     /// From the counts, with range walk taken out where there is a bound.
     pub depth_m: f64,
     /// As [`PixelDepth::bound_m`].
@@ -85,23 +85,23 @@ pub const RETURNS: usize = 4;
 
 /// Up to four returns, strongest first. In files they are a list.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Vec<Return>", into = "Vec<Return>")]
-pub struct Returns([Option<Return>; RETURNS]);
+#[serde(from = "Vec<DepthReturn>", into = "Vec<DepthReturn>")]
+pub struct DepthReturns([Option<DepthReturn>; RETURNS]);
 
-impl Returns {
+impl DepthReturns {
     /// The returns, strongest first.
-    pub fn iter(&self) -> impl Iterator<Item = &Return> {
+    pub fn iter(&self) -> impl Iterator<Item = &DepthReturn> {
         self.0.iter().flatten()
     }
 
     /// A number of each; not a number where there are fewer, or it has none.
-    pub fn numbers(&self, number: impl Fn(&Return) -> Option<f64>) -> [f64; RETURNS] {
+    pub fn numbers(&self, number: impl Fn(&DepthReturn) -> Option<f64>) -> [f64; RETURNS] {
         self.0
             .map(|of| of.and_then(|of| number(&of)).unwrap_or(f64::NAN))
     }
 
     /// The `n`-th of them, from 0 on.
-    pub fn get(&self, n: usize) -> Option<&Return> {
+    pub fn get(&self, n: usize) -> Option<&DepthReturn> {
         self.iter().nth(n)
     }
 
@@ -111,21 +111,21 @@ impl Returns {
     }
 }
 
-impl FromIterator<Return> for Returns {
-    fn from_iter<I: IntoIterator<Item = Return>>(returns: I) -> Self {
+impl FromIterator<DepthReturn> for DepthReturns {
+    fn from_iter<I: IntoIterator<Item = DepthReturn>>(returns: I) -> Self {
         let mut all = returns.into_iter();
-        Returns(std::array::from_fn(|_| all.next()))
+        DepthReturns(std::array::from_fn(|_| all.next()))
     }
 }
 
-impl From<Vec<Return>> for Returns {
-    fn from(returns: Vec<Return>) -> Self {
+impl From<Vec<DepthReturn>> for DepthReturns {
+    fn from(returns: Vec<DepthReturn>) -> Self {
         returns.into_iter().collect()
     }
 }
 
-impl From<Returns> for Vec<Return> {
-    fn from(returns: Returns) -> Self {
+impl From<DepthReturns> for Vec<DepthReturn> {
+    fn from(returns: DepthReturns) -> Self {
         returns.iter().copied().collect()
     }
 }
@@ -151,8 +151,8 @@ pub struct PixelDepth {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread_m: Option<f64>,
     /// All echoes of the window, the one of the depth first.
-    #[serde(default, skip_serializing_if = "Returns::is_empty")]
-    pub returns: Returns,
+    #[serde(default, skip_serializing_if = "DepthReturns::is_empty")]
+    pub returns: DepthReturns,
     /// Why range walk is left in that depth; `None` where it is taken out, or was not asked to be.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub walk_left: Option<WalkLeft>,
@@ -168,8 +168,8 @@ pub struct PixelDepth {
 pub(crate) fn cloud(camera: &PinholeCamera, cols: usize, pixels: &[PixelDepth]) -> Vec<CloudPoint> {
     let points = pixels.iter().enumerate().flat_map(|(pixel, of)| {
         let (row, col) = (pixel / cols, pixel % cols);
-        let towards = camera.towards((row, col));
-        let point = move |(number, found): (u16, &Return)| CloudPoint {
+        let towards = camera.direction((row, col));
+        let point = move |(number, found): (u16, &DepthReturn)| CloudPoint {
             at_m: (towards * found.depth_m).to_array().map(|x| x as f32),
             intensity: found.photons as f32,
             confidence: found.confidence as f32,

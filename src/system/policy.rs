@@ -217,7 +217,7 @@ impl<'p> Pointing<'p> {
                     (None, Unguided::Neighbour) => self.neighbours(guide, pixel),
                     _ => None,
                 };
-                self.heed(memory, estimate.or(borrowed));
+                self.forget_old_target(memory, estimate.or(borrowed));
                 let (start, why) = self.choose(pixel, memory, estimate, borrowed);
                 memory.start = start;
                 match start {
@@ -255,7 +255,7 @@ impl<'p> Pointing<'p> {
     }
 
     /// Forgets what was seen and searched when the guide speaks of another target than before.
-    fn heed(&self, memory: &mut Memory, estimate: Option<(f64, f64)>) {
+    fn forget_old_target(&self, memory: &mut Memory, estimate: Option<(f64, f64)>) {
         if let (Some((now_m, now_sigma)), Some((then_m, then_sigma))) = (estimate, memory.estimate)
             && (now_m - then_m).abs() > self.sigmas * libm::hypot(now_sigma, then_sigma)
         {
@@ -340,8 +340,8 @@ impl<'p> Pointing<'p> {
     fn inner_cells(&self, start: u16) -> Option<Range<usize>> {
         let (from, cell_m, cells) = self.cells;
         let inner = self.inner(start)?;
-        let at = |m: f64| (((m - from) / cell_m).round().max(0.0) as usize).min(cells);
-        let (first, end) = (at(inner.start), at(inner.end));
+        let cell = |m: f64| (((m - from) / cell_m).round().max(0.0) as usize).min(cells);
+        let (first, end) = (cell(inner.start), cell(inner.end));
         // A window that steps farther than its inner part still looks at one cell.
         Some(first..end.max((first + 1).min(cells)))
     }

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use super::aim::{Aims, Place, own_law};
-use super::pixel::{NoDepth, PixelDepth, Return, Returns};
+use super::aim::{AimedHistogram, Aims, own_law};
+use super::pixel::{DepthReturn, DepthReturns, NoDepth, PixelDepth};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, Tdc, WindowLaw};
 use crate::files::InputError;
@@ -15,7 +15,7 @@ use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// What is known of a macropixel beside its histogram.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Known {
+pub(crate) struct PixelContext {
     /// Its number in the array.
     pub(crate) pixel: usize,
     /// Its start value; `None` where its SPADs are off.
@@ -26,10 +26,10 @@ pub(crate) struct Known {
     pub(crate) guide_m: Option<f64>,
 }
 
-impl Known {
+impl PixelContext {
     /// What was known of macropixel number `pixel` when its depth was found.
-    pub(crate) fn of(pixel: usize, depth: &PixelDepth) -> Self {
-        Known {
+    pub(crate) fn new(pixel: usize, depth: &PixelDepth) -> Self {
+        PixelContext {
             pixel,
             start: depth.start,
             true_m: depth.true_m,
@@ -39,7 +39,7 @@ impl Known {
 
     /// Whether this was known of a macropixel when its depth was found.
     pub(crate) fn is_of(&self, depth: &PixelDepth) -> bool {
-        *self == Known::of(self.pixel, depth)
+        *self == PixelContext::new(self.pixel, depth)
     }
 }
 
@@ -108,7 +108,7 @@ impl<'a> Ranger<'a> {
     }
 
     /// The peak that the depth is found by, significant or not.
-    pub(crate) fn peak(&self, known: &Known, counts: &[u16]) -> Option<Peak> {
+    pub(crate) fn peak(&self, known: &PixelContext, counts: &[u16]) -> Option<Peak> {
         let sight = self.sight(known.pixel, known.start, counts);
         sight.sighting.map(|sighting| sighting.peak)
     }
@@ -118,7 +118,7 @@ impl<'a> Ranger<'a> {
         let law = own_law(&self.law, pixel);
         let window = start.and_then(|start| law.window(start).open());
         let counts: Vec<u32> = counts.iter().map(|&n| n.into()).collect();
-        let place = Place {
+        let place = AimedHistogram {
             pixel,
             start: start.unwrap_or(self.farthest),
             law: &law,
@@ -149,7 +149,7 @@ impl<'a> Ranger<'a> {
             let spread_bins = self.finder.spread_bins(&s.light?)?;
             Some(to_m(spread_bins))
         });
-        let first = found.zip(measured_m).map(|(s, depth_m)| Return {
+        let first = found.zip(measured_m).map(|(s, depth_m)| DepthReturn {
             depth_m,
             bound_m,
             spread_m,
@@ -165,7 +165,7 @@ impl<'a> Ranger<'a> {
             let at = at.min(counts.len() - 1);
             let depth_m = range_m(other.position_bins, at)?;
             let (depth_m, bound_m) = in_front(depth_m, other.bound_bins)?;
-            Some(Return {
+            Some(DepthReturn {
                 depth_m,
                 bound_m,
                 spread_m: other.spread_bins.map(to_m),
@@ -173,7 +173,7 @@ impl<'a> Ranger<'a> {
                 confidence: other.confidence,
             })
         });
-        let returns: Returns = first.into_iter().chain(others).collect();
+        let returns: DepthReturns = first.into_iter().chain(others).collect();
         let reading = Reading {
             measured_m,
             bound_m,
@@ -193,8 +193,8 @@ impl<'a> Ranger<'a> {
     }
 
     /// The macropixel's depth from its `counts`, one for each bin.
-    pub(crate) fn depth(&self, known: &Known, counts: &[u16]) -> PixelDepth {
-        let &Known {
+    pub(crate) fn depth(&self, known: &PixelContext, counts: &[u16]) -> PixelDepth {
+        let &PixelContext {
             pixel,
             start,
             true_m,
@@ -239,12 +239,14 @@ impl<'a> Ranger<'a> {
     pub(crate) fn of_array<T: Send>(
         &self,
         counts: &[u16],
-        of: impl Fn(usize, &[u16]) -> T + Sync,
+        evaluate: impl Fn(usize, &[u16]) -> T + Sync,
     ) -> Vec<T> {
         let sensor = self.law.sensor();
         assert_eq!(counts.len(), sensor.pixels() * sensor.bins);
         let pixels = counts.par_chunks_exact(sensor.bins).enumerate();
-        pixels.map(|(pixel, counts)| of(pixel, counts)).collect()
+        pixels
+            .map(|(pixel, counts)| evaluate(pixel, counts))
+            .collect()
     }
 }
 
@@ -282,7 +284,7 @@ pub struct Reading {
     /// Standard deviation of the depths within the macropixel, where there is a bound, m.
     pub spread_m: Option<f64>,
     /// All echoes of the window, that of the distance first.
-    pub returns: Returns,
+    pub returns: DepthReturns,
     /// Why range walk is left in it.
     pub walk_left: Option<WalkLeft>,
     /// Why there is none: no guide (SPADs are off), saturated, no significant peak, or an echo from behind the lidar.

@@ -41,7 +41,10 @@ impl Circumstances<'_> {
             return Some("no depths, because no macropixel sees a surface".to_owned());
         }
         let commonest = self.reason_of_most()?;
-        let missing: usize = NoDepth::ALL.into_iter().map(|r| self.without(r)).sum();
+        let missing: usize = NoDepth::ALL
+            .into_iter()
+            .map(|r| self.count_without(r))
+            .sum();
         let why = match commonest {
             NoDepth::NoSurface => return None,
             NoDepth::NoGuide => self.no_guide(),
@@ -56,7 +59,7 @@ impl Circumstances<'_> {
                 "a fit puts these echoes before the laser's pulse; light so near or so strong does not tell its place".to_owned()
             }
         };
-        let (name, count) = (commonest.name(), self.without(commonest));
+        let (name, count) = (commonest.name(), self.count_without(commonest));
         Some(format!(
             "{missing} of {surfaces} surfaces have no depth, {count} of them for the reason {name:?}: {why}"
         ))
@@ -67,17 +70,17 @@ impl Circumstances<'_> {
         let is_said = self.reason_of_most();
         let is_worth_it = |reason: NoDepth| {
             is_said != Some(reason)
-                && self.without(reason) as f64 > WORTH_A_HINT * self.surfaces() as f64
+                && self.count_without(reason) as f64 > WORTH_A_HINT * self.surfaces() as f64
         };
         let mut hints = Vec::new();
         if is_worth_it(NoDepth::NoGuide) {
-            let (count, why) = (self.without(NoDepth::NoGuide), self.no_guide());
+            let (count, why) = (self.count_without(NoDepth::NoGuide), self.no_guide());
             hints.push(format!(
                 "{count} surfaces have no guide: {why}; unguided = \"neighbour\" takes over the estimates of neighbours"
             ));
         }
         if is_worth_it(NoDepth::Saturated) {
-            let (count, why) = (self.without(NoDepth::Saturated), self.saturated());
+            let (count, why) = (self.count_without(NoDepth::Saturated), self.saturated());
             hints.push(format!("{count} surfaces are saturated: {why}"));
         }
         hints
@@ -89,20 +92,23 @@ impl Circumstances<'_> {
     }
 
     /// Surfaces without a depth for this reason.
-    fn without(&self, reason: NoDepth) -> usize {
+    fn count_without(&self, reason: NoDepth) -> usize {
         let has_reason = |p: &&PixelDepth| p.true_m.is_some() && p.no_depth == Some(reason);
         self.pixels.iter().filter(has_reason).count()
     }
 
     /// The commonest reason, if more than half of the surfaces have no depth.
     fn reason_of_most(&self) -> Option<NoDepth> {
-        let missing: usize = NoDepth::ALL.into_iter().map(|r| self.without(r)).sum();
+        let missing: usize = NoDepth::ALL
+            .into_iter()
+            .map(|r| self.count_without(r))
+            .sum();
         if 2 * missing <= self.surfaces() {
             return None;
         }
         // Of equally common reasons the one that comes first holds first.
         let reasons = NoDepth::ALL.into_iter().rev();
-        reasons.max_by_key(|&reason| self.without(reason))
+        reasons.max_by_key(|&reason| self.count_without(reason))
     }
 
     /// Nearest and farthest of what macropixels without a depth for this reason have of `distance`.
@@ -419,8 +425,8 @@ mod tests {
         let is_there = |pixel: usize, measured_m: f64| {
             let (row, col) = ((pixel / 16) as f64, (pixel % 16) as f64);
             let rays = (0..64 * 64).map(|ray| {
-                let at = |n: i32| (f64::from(n) + 0.5) / 64.0;
-                let (u, v) = (col + at(ray % 64), row + at(ray / 64));
+                let phase = |n: i32| (f64::from(n) + 0.5) / 64.0;
+                let (u, v) = (col + phase(ray % 64), row + phase(ray / 64));
                 Ray::new(DVec3::ZERO, camera.at_unit_depth((u, v)))
             });
             let mut hits = rays.filter_map(|ray| scene.hit(&ray));

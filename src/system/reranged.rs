@@ -1,25 +1,25 @@
 //! Depths from existing histograms: a frame's own once more, or those that a real chip counted in the same windows.
 
 use super::pixel::PixelDepth;
-use super::ranger::{Known, Ranger};
-use super::summary::Summary;
+use super::ranger::{PixelContext, Ranger};
+use super::summary::FrameSummary;
 use super::taken::{TakenFrame, TakenSettings};
 use crate::ranging::{BinProfile, DepthOptions, UnequalBins};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Depths of an array.
 #[derive(Debug, Clone)]
-pub struct Ranged {
+pub struct ArrayDepths {
     /// Every macropixel, row-major.
     pub pixels: Vec<PixelDepth>,
     /// Light's way there and back in one bin, m.
     pub bin_m: f64,
 }
 
-impl Ranged {
+impl ArrayDepths {
     /// In a few numbers.
-    pub(crate) fn summary(&self) -> Summary {
-        Summary::new(&self.pixels, self.bin_m)
+    pub(crate) fn summary(&self) -> FrameSummary {
+        FrameSummary::new(&self.pixels, self.bin_m)
     }
 }
 
@@ -37,7 +37,7 @@ impl TakenFrame {
         counts: &[u16],
         options: &DepthOptions,
         calibration: Option<&BinProfile>,
-    ) -> Result<Ranged, UnequalBins> {
+    ) -> Result<ArrayDepths, UnequalBins> {
         let TakenSettings {
             sensor,
             exposure,
@@ -46,9 +46,9 @@ impl TakenFrame {
         } = &self.settings;
         let ranger = Ranger::new(sensor, exposure, scene, options, calibration)?;
         let depth = |pixel: usize, counts: &[u16]| {
-            ranger.depth(&Known::of(pixel, &self.pixels[pixel]), counts)
+            ranger.depth(&PixelContext::new(pixel, &self.pixels[pixel]), counts)
         };
-        Ok(Ranged {
+        Ok(ArrayDepths {
             pixels: ranger.of_array(counts, depth),
             bin_m: ranger.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
         })

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::pixel::PixelDepth;
-use super::summary::Summary;
-use super::tolerance::Kept;
-use crate::engine::Work;
+use super::summary::FrameSummary;
+use super::tolerance::ToleranceResult;
+use crate::engine::EngineWork;
 use crate::units::Time;
 
 /// Wall-clock seconds of each phase of the simulation.
@@ -60,9 +60,9 @@ pub struct Frame {
     /// Photons and dark counts that the light makes of the whole array on average.
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.
-    pub work: Work,
+    pub work: EngineWork,
     /// Engines chosen by a depth tolerance, and the bound they keep.
-    pub kept: Option<Kept>,
+    pub kept: Option<ToleranceResult>,
     /// Bits of the serial load.
     pub load_bits: usize,
     /// Time the chip needs for the load.
@@ -82,7 +82,7 @@ pub struct Frame {
 
 impl Frame {
     /// The frame in a few numbers.
-    pub fn summary(&self) -> Summary {
-        Summary::new(&self.pixels, self.bin_m)
+    pub fn summary(&self) -> FrameSummary {
+        FrameSummary::new(&self.pixels, self.bin_m)
     }
 }

@@ -74,7 +74,7 @@ impl EngineKind {
 
 /// A macropixel to run at gate level as well, with its waveform.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Probe {
+pub struct GateProbe {
     /// Row in the array.
     pub row: usize,
     /// Column in the array.

@@ -82,8 +82,8 @@ impl<K: PartialEq, V> Latest<K, V> {
 pub(crate) struct SharedWork {
     load_paths: Latest<Sensor, Netlist>,
     loads: Latest<(Sensor, Vec<u16>), Time>,
-    looks: Mutex<Vec<Arc<Look>>>,
-    engines: Latest<(Arc<Look>, Lidar, Light, CohortOptions), Cohort>,
+    looks: Mutex<Vec<Arc<SharedView>>>,
+    engines: Latest<(Arc<SharedView>, Lidar, Light, CohortOptions), Cohort>,
     /// How many seeds frames have that are else the same.
     seeds: u64,
 }
@@ -93,7 +93,7 @@ pub(super) type GuidedWindows = (GuideMap, Vec<Option<u16>>);
 
 /// What frames share whose scenes look alike, in one exposure of one array.
 #[derive(Debug)]
-pub(super) struct Look {
+pub(super) struct SharedView {
     /// One of the scenes.
     scene: Scene,
     sensor: Sensor,
@@ -104,7 +104,7 @@ pub(super) struct Look {
 }
 
 /// A look is itself alone.
-impl PartialEq for Look {
+impl PartialEq for SharedView {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::eq(self, other)
     }
@@ -124,7 +124,7 @@ impl SharedWork {
     }
 
     /// The engine `cohort` for settings with this look.
-    pub(super) fn cohort(&self, look: &Arc<Look>, settings: &FrameSettings) -> Arc<Cohort> {
+    pub(super) fn cohort(&self, look: &Arc<SharedView>, settings: &FrameSettings) -> Arc<Cohort> {
         let FrameSettings { scene, cohort, .. } = settings;
         let engine = || Cohort::new(&look.sensor, &look.exposure, *cohort);
         if self.seeds < 2 {
@@ -150,7 +150,7 @@ impl SharedWork {
     }
 
     /// What frames with these settings share with those whose scenes look like this one.
-    pub(super) fn look(&self, settings: &FrameSettings) -> Arc<Look> {
+    pub(super) fn shared_look(&self, settings: &FrameSettings) -> Arc<SharedView> {
         let FrameSettings {
             sensor,
             scene,
@@ -158,7 +158,7 @@ impl SharedWork {
             ..
         } = settings;
         let mut looks = self.looks.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_its = |look: &&Arc<Look>| {
+        let is_its = |look: &&Arc<SharedView>| {
             look.exposure == *exposure && look.sensor == *sensor && look.scene.looks_like(scene)
         };
         if let Some(look) = looks.iter().find(is_its) {
@@ -167,7 +167,7 @@ impl SharedWork {
         if looks.len() == MOST_LOOKS {
             looks.remove(0);
         }
-        let look = Arc::new(Look {
+        let look = Arc::new(SharedView {
             scene: scene.clone(),
             sensor: sensor.clone(),
             exposure: *exposure,
@@ -180,7 +180,7 @@ impl SharedWork {
     }
 }
 
-impl Look {
+impl SharedView {
     /// What is really there.
     pub(super) fn truth(&self) -> Arc<GroundTruth> {
         let render = || Arc::new(truth_in(&self.sensor, &self.exposure, &self.scene));

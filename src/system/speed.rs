@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::chip::{Exposure, Sensor, SensorConfig};
-use crate::engine::{EngineError, Expose, Exposed, LitPixel, expose, stream_config};
+use crate::engine::{EngineError, Expose, ExposureResult, LitPixel, expose, stream_config};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use crate::units::Time;
 
@@ -133,7 +133,7 @@ impl SpeedFrame {
     ///
     /// # Errors
     /// As [`expose`].
-    pub fn expose(&self, engine: &dyn Expose) -> Result<Exposed, EngineError> {
+    pub fn expose(&self, engine: &dyn Expose) -> Result<ExposureResult, EngineError> {
         expose(engine, &self.stream, &self.pixels, |_| ())
     }
 }
@@ -158,9 +158,13 @@ mod tests {
             let pulses: Vec<&[SpadEvent]> = pulses.iter().map(Vec::as_slice).collect();
             let cycle = Cycle::new(sensor, exposure);
             let packed = cycle.pack(&starts, &pulses);
-            let replayed = cycle.run(&starts, &packed).unwrap();
+            let replayed = cycle.replay_packed(&starts, &packed).unwrap();
             let live = Cycle::new(sensor, exposure).with_live_control();
-            assert_eq!(live.run(&starts, &packed).unwrap(), replayed, "{case:?}");
+            assert_eq!(
+                live.replay_packed(&starts, &packed).unwrap(),
+                replayed,
+                "{case:?}"
+            );
             let window = Window::new(sensor, exposure);
             assert_eq!(
                 window.histograms(&starts, &pulses).unwrap(),

@@ -13,7 +13,7 @@ use crate::ranging::WalkLeft;
 
 /// A frame in a few numbers, distances in metres.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
+pub struct FrameSummary {
     /// Macropixels.
     pub pixels: usize,
     /// Macropixels that see a surface at all.
@@ -60,7 +60,7 @@ pub struct Summary {
     pub guide_rms_error_m: Option<f64>,
 }
 
-impl Summary {
+impl FrameSummary {
     /// Of macropixels with bins of `bin_m`.
     pub(crate) fn new(pixels: &[PixelDepth], bin_m: f64) -> Self {
         let count = |f: &dyn Fn(&PixelDepth) -> bool| pixels.iter().filter(|p| f(p)).count();
@@ -76,7 +76,7 @@ impl Summary {
             .collect();
         let with_target = count(&|p| p.true_m.is_some());
         let outliers = errors.len() - without_outliers.len();
-        let share = |part: usize, of: usize| (of > 0).then(|| part as f64 / of as f64);
+        let share = |part: usize, whole: usize| (whole > 0).then(|| part as f64 / whole as f64);
         let missing = std::iter::repeat_n(f64::INFINITY, with_target - errors.len());
         let of_all = errors.iter().map(|e| e.abs()).chain(missing);
         let mut no_depth = BTreeMap::new();
@@ -89,7 +89,7 @@ impl Summary {
         for reason in pixels.iter().filter_map(|p| p.walk_left) {
             *walk_left.entry(reason).or_default() += 1;
         }
-        Summary {
+        FrameSummary {
             pixels: pixels.len(),
             with_target,
             guided: count(&|p| p.start.is_some()),
@@ -174,7 +174,7 @@ mod tests {
             pixel(false, None, None),
             pixel(false, Some(50.0), Some(50.0)),
         ];
-        let summary = Summary::new(&pixels, 0.5);
+        let summary = FrameSummary::new(&pixels, 0.5);
         let near = |value: Option<f64>, wanted: f64| (value.unwrap() - wanted).abs() < 1e-12;
         assert_eq!((summary.pixels, summary.with_target), (6, 4));
         assert_eq!((summary.depths, summary.depths_without_surface), (4, 1));
@@ -198,13 +198,13 @@ mod tests {
             summary.no_depth,
             BTreeMap::from([(NoDepth::NoSurface, 1), (NoDepth::NoSignificantPeak, 1)])
         );
-        let half_missing = Summary::new(&pixels[2..4], 0.5);
+        let half_missing = FrameSummary::new(&pixels[2..4], 0.5);
         assert_eq!(half_missing.median_absolute_error_of_all_m, None);
     }
 
     #[test]
     fn an_empty_frame_has_no_errors() {
-        let summary = Summary::new(&[pixel(false, None, None)], 0.4);
+        let summary = FrameSummary::new(&[pixel(false, None, None)], 0.4);
         assert_eq!(summary.rms_error_m, None);
         assert_eq!(summary.median_absolute_error_of_all_m, None);
         assert_eq!(summary.share_within_a_bin, None);

@@ -66,7 +66,7 @@ struct Version {
 
 /// What `frame.json` and `drive.json` have in common.
 #[derive(Deserialize)]
-struct Asked {
+struct RecordedRequest {
     scene_name: String,
     scene: toml::Table,
     sensor: toml::Table,
@@ -82,7 +82,7 @@ struct Asked {
 #[derive(Deserialize)]
 struct File<T> {
     #[serde(flatten)]
-    asked: Asked,
+    asked: RecordedRequest,
     #[serde(flatten)]
     rest: T,
 }
@@ -125,12 +125,15 @@ impl TakenSettings {
     }
 }
 
-impl Asked {
+impl RecordedRequest {
     fn settings(self, path: &Path) -> Result<TakenSettings, InputError> {
         let source = path.display();
-        let sensor = Document::of(format!("{source}, sensor"), self.sensor);
+        let sensor = Document::from_table(format!("{source}, sensor"), self.sensor);
         let sensor = Sensor::from(SensorConfig::read_document(&sensor)?);
-        let scene = Scene::read(&Document::of(format!("{source}, scene"), self.scene))?;
+        let scene = Scene::read(&Document::from_table(
+            format!("{source}, scene"),
+            self.scene,
+        ))?;
         let exposure = Exposure::checked(&sensor, self.stop_periods, self.laser_cycles)
             .map_err(|fault| InputError::new(source, format!("{fault}; take it anew")))?;
         let usual = DepthOptions::default();

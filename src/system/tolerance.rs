@@ -19,8 +19,8 @@ use serde::Serialize;
 use super::price;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{
-    Answer, Cohort, CohortOptions, EngineError, Expose, Exposed, Histograms, LitPixel, Window,
-    Work, expose,
+    Answer, Cohort, CohortOptions, EngineError, EngineWork, Expose, ExposureResult, Histograms,
+    LitPixel, Window, expose,
 };
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{PeakOptions, interpolate};
@@ -72,7 +72,7 @@ impl OnWindow {
 
 /// What was chosen, and the bound that it keeps.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Kept {
+pub struct ToleranceResult {
     /// What was asked for, m.
     pub tolerance_m: f64,
     /// Largest bound of all macropixels, m.
@@ -87,7 +87,7 @@ pub struct Kept {
     pub refused_run_time_share: f64,
 }
 
-impl Kept {
+impl ToleranceResult {
     /// Macropixels that the cohort engine refused, by the reason in words.
     pub(crate) fn refused(&self) -> impl Iterator<Item = (&'static str, usize)> {
         let reasons = self.on_window_by_reason.iter();
@@ -119,7 +119,7 @@ impl Tolerance<'_> {
         stream: &PhotonStream,
         pixels: &[LitPixel],
         done: impl Fn(usize) -> A + Sync,
-    ) -> Result<(Exposed, Kept), EngineError> {
+    ) -> Result<(ExposureResult, ToleranceResult), EngineError> {
         let Tolerance {
             tolerance_m,
             sensor,
@@ -149,11 +149,11 @@ impl Tolerance<'_> {
             .map(|pixel| planner.choose(pixel, tolerance_m))
             .collect();
 
-        let mut kept = Kept {
+        let mut kept = ToleranceResult {
             tolerance_m,
             bound_m: plan.iter().flatten().copied().fold(0.0, f64::max),
             on_cohort: plan.iter().flatten().count(),
-            ..Kept::default()
+            ..ToleranceResult::default()
         };
         kept.on_window = pixels.len() - kept.on_cohort;
         for &why in plan.iter().filter_map(|choice| choice.as_ref().err()) {
@@ -164,7 +164,7 @@ impl Tolerance<'_> {
             Err(why) => why.refusal().is_some(),
         };
         let mut histograms = Histograms::empty(pixels.len(), self.sensor.bins);
-        let mut work = Work::default();
+        let mut work = EngineWork::default();
         let mut run = |engine: &dyn Expose, takes: &dyn Fn(&Result<f64, OnWindow>) -> bool| {
             let begin = Instant::now();
             let members: Vec<usize> = (0..pixels.len()).filter(|&i| takes(&plan[i])).collect();
@@ -182,7 +182,7 @@ impl Tolerance<'_> {
         if kept.refused().next().is_some() {
             kept.refused_run_time_share = refused.as_secs_f64() / begin.elapsed().as_secs_f64();
         }
-        Ok((Exposed { histograms, work }, kept))
+        Ok((ExposureResult { histograms, work }, kept))
     }
 }
 

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::chip::Exposure;
 use crate::photon::{PhotonStream, PixelLight};
-use crate::scene::{Before, GroundTruth, Scene};
+use crate::scene::{GroundTruth, PreviousWorld, Scene};
 
 /// The last world of an exposure.
 #[derive(Debug)]
@@ -29,9 +29,9 @@ pub(super) fn worlds(scene: &Scene, exposure_s: Range<f64>, segments: u32) -> Ve
     let length_s = (exposure_s.end - exposure_s.start) / f64::from(segments);
     let middle_s = |n: u32| exposure_s.start + (f64::from(n) + 0.5) * length_s;
     if scene.is_still() {
-        vec![scene.at(0.0)]
+        vec![scene.snapshot(0.0)]
     } else {
-        (0..segments).map(|n| scene.at(middle_s(n))).collect()
+        (0..segments).map(|n| scene.snapshot(middle_s(n))).collect()
     }
 }
 
@@ -47,11 +47,11 @@ pub(super) fn truths(
     let mut all_kept = 0;
     for (n, world) in worlds.iter().enumerate() {
         let before = match truths.last() {
-            Some(truth) => Some(Before {
+            Some(truth) => Some(PreviousWorld {
                 world: &worlds[n - 1],
                 truth,
             }),
-            None => last.map(LastWorld::seen),
+            None => last.map(LastWorld::previous_world),
         };
         let before = before.filter(|_| reuse);
         let (truth, kept) = GroundTruth::render_after(world, rows, cols, before);
@@ -74,9 +74,9 @@ pub(super) fn lights(
         let before = match lights.last() {
             Some(light) => {
                 let (world, truth) = (&worlds[n - 1], &truths[n - 1]);
-                Some((Before { world, truth }, &light[..]))
+                Some((PreviousWorld { world, truth }, &light[..]))
             }
-            None => last.map(|last| (last.seen(), &last.light[..])),
+            None => last.map(|last| (last.previous_world(), &last.light[..])),
         };
         let before = before.filter(|_| reuse);
         lights.push(world.light_after(truth, &stream.config().spads, before));
@@ -86,7 +86,7 @@ pub(super) fn lights(
 
 impl LastWorld {
     /// Of the worlds of an exposure, of which there is at least one.
-    pub(super) fn of(
+    pub(super) fn new(
         worlds: &[Scene],
         truths: Vec<GroundTruth>,
         lights: Vec<Vec<PixelLight>>,
@@ -98,8 +98,8 @@ impl LastWorld {
         })
     }
 
-    fn seen(&self) -> Before<'_> {
-        Before {
+    fn previous_world(&self) -> PreviousWorld<'_> {
+        PreviousWorld {
             world: &self.world,
             truth: &self.truth,
         }

@@ -23,7 +23,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Start value.
 const START: u16 = 3;
@@ -150,7 +150,7 @@ fn window_by_window(
         &rises(&start)[..1],
     );
     // The model, edge by edge: START is high from the first edge of the window until the next STOP.
-    let mut model = metdc_counter::Model::new(config.bins);
+    let mut model = metdc_counter::MetdcCounterModel::new(config.bins);
     let (mut as_modelled, mut edges_seen) = (0, 0);
     for edge in 0..i64::from(STOP_PERIODS) {
         model.clock(edge >= opens.first_edge);
@@ -235,12 +235,12 @@ fn view(config: &SensorConfig, shown: (Time, Time), origin: Time) -> Layout {
     let period = config.clock().period();
     Layout {
         groups: vec![
-            Group::new(
+            SignalGroup::new(
                 "Global signals",
                 [Entry::binary("CLK"), Entry::binary("STOP")],
             ),
-            Group::new(format!("Window of start value {START}"), window),
-            Group::new("Events", events.into_iter().chain(bins)),
+            SignalGroup::new(format!("Window of start value {START}"), window),
+            SignalGroup::new("Events", events.into_iter().chain(bins)),
         ],
         zoom: (shown.0 - period * 2, shown.1 + period * 3),
         marker: Some(origin),

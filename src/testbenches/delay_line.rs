@@ -21,7 +21,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// The column of the first macropixel.
 const COLUMN: usize = 39;
@@ -72,7 +72,7 @@ fn edges(waves: &Path, sensor: &Sensor, checks: &mut Checks) -> Result<(), Input
     let place = (0, COLUMN);
     let mut gate = GateSimulation::new(sensor, &exposure, place, (1, 2), &STARTS, &pulses);
     let netlist = Arc::clone(gate.netlist());
-    let local_stop = SensorPins::of(&netlist).local_stop;
+    let local_stop = SensorPins::find(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
     write_waves(waves, &netlist, &view(sensor, &exposure, origin), |waves| {
@@ -159,7 +159,7 @@ fn meetings(sensor: &Sensor, checks: &mut Checks) {
 }
 
 fn view(sensor: &Sensor, exposure: &Exposure, origin: Time) -> Layout {
-    let mut groups = vec![Group::new(
+    let mut groups = vec![SignalGroup::new(
         "Global signals",
         [Entry::binary("CLK"), Entry::binary("STOP")],
     )];
@@ -182,7 +182,7 @@ fn view(sensor: &Sensor, exposure: &Exposure, origin: Time) -> Layout {
             hits(Probe::Hit.path(&name), sensor.bins),
         ];
         let bins = (0..sensor.bins).map(|bin| Entry::decimal(probes::bin_path(&name, bin)));
-        groups.push(Group::new(
+        groups.push(SignalGroup::new(
             format!("Column {}: {start}", COLUMN + pixel),
             signals.into_iter().chain(bins),
         ));

@@ -16,7 +16,7 @@ mod closed_forms;
 
 use std::path::Path;
 
-use self::bench::{BEGIN, Bench, Point, STEPS, view};
+use self::bench::{BEGIN, Bench, RatePoint, STEPS, view};
 use self::closed_forms::{Laws, charts, compare, folds, table};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -40,7 +40,7 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     // 1 M to 1 G.
     let rates =
         (6 * STEPS..=9 * STEPS).map(|step| libm::pow(10f64, f64::from(step) / f64::from(STEPS)));
-    let points: Vec<Point> = rates.map(|photons_hz| bench.count(photons_hz)).collect();
+    let points: Vec<RatePoint> = rates.map(|photons_hz| bench.count(photons_hz)).collect();
     checks.note(table(&points));
     compare(&points, &laws, checks);
     folds(&points, &laws, checks);

@@ -19,7 +19,7 @@ use crate::netlist::{CellKind, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 use bitvec::slice::BitSlice;
 
 /// When the chip comes out of reset.
@@ -67,7 +67,7 @@ struct Bench {
 impl Bench {
     fn new(config: SensorConfig) -> Self {
         let netlist = load_netlist(&config);
-        let pins = LoadPins::of(&netlist);
+        let pins = LoadPins::find(&netlist);
         let mut bench = Bench {
             resetb: pins.resetb,
             enable: pins.enable,
@@ -259,19 +259,19 @@ fn timing(bench: &Bench, recorder: &Recorder, all: &[Pulse], checks: &mut Checks
     let cut =
         delay(CellKind::Nand2, One) + delay(CellKind::Nor2, Zero) + delay(CellKind::And2, Zero);
     let last_row = bench.config.rows - 1;
-    let of = |is_last: bool| {
+    let widths = |is_last: bool| {
         let pulses = all.iter().filter(move |p| (p.row == last_row) == is_last);
         pulses.map(|p| p.fall - p.rise).collect::<Vec<Time>>()
     };
     checks.times(
         "MEMORY_LOAD width, ended by LOAD_CLK",
         half + fall - rise,
-        &of(false),
+        &widths(false),
     );
     checks.times(
         "MEMORY_LOAD width, ended by LOAD_ENABLE",
         half + cut - rise,
-        &of(true),
+        &widths(true),
     );
 
     let row_changes: Vec<Time> = recorder
@@ -360,7 +360,7 @@ fn whole_sensor(checks: &mut Checks) {
     let all = (Time::ZERO, Time::MAX);
     duration(config, &recorder, &bench, all, &what, checks);
     let (bits, us) = (config.load_bits(), found.duration.as_s() * 1e6);
-    checks.that(
+    checks.add_verdict(
         format!(
             "{what}: kbit, and time at {} MHz (4.7)",
             config.load_clk_hz / 1e6
@@ -381,14 +381,14 @@ fn view(config: &SensorConfig, (start, end): (Time, Time)) -> Layout {
         Entry::hex(LoadProbe::Row.path()),
         Entry::binary(LoadProbe::RowDone.path()),
     ];
-    let mut groups = vec![Group::new("Load path (Fig. 57)", shared)];
+    let mut groups = vec![SignalGroup::new("Load path (Fig. 57)", shared)];
     for row in 0..config.rows {
         let load = Probe::MemoryLoad.path(&load_path::memory_name(row, 0));
         let memories = (0..config.cols).map(|col| {
             let memory = Entry::decimal(probes::memory_path(row, col));
             memory.named(format!("MEMORY of column {col}"))
         });
-        groups.push(Group::new(
+        groups.push(SignalGroup::new(
             format!("Row {row}, columns 0 to {}", config.cols - 1),
             [Entry::binary(load)].into_iter().chain(memories),
         ));

@@ -27,7 +27,7 @@ use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::testbenches::testbench::GivenSensor;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout, Mark};
+use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
 /// Start values of Fig. 48's two macropixels, three bins apart.
 const FIG_48: [u16; 2] = [52, 49];
@@ -168,7 +168,7 @@ fn middle(law: &WindowLaw, window: &OpenWindow, cycle: u32, bin: i64) -> Time {
 }
 
 /// What the gates count with one start value; `None` where a bin is unknown.
-fn counted(
+fn gate_counts(
     config: &SensorConfig,
     exposure: &Exposure,
     start: u16,
@@ -199,7 +199,7 @@ fn by_law(
 }
 
 /// Histograms and other lists, or that there is none.
-fn shown<T: Debug>(counts: &Option<T>) -> String {
+fn counts_text<T: Debug>(counts: &Option<T>) -> String {
     counts
         .as_ref()
         .map_or("unknown".to_owned(), |c| format!("{c:?}"))
@@ -238,7 +238,7 @@ fn two_windows(
     let lists = [&pulses[..], &pulses[..]];
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &starts, &lists);
     let netlist = Arc::clone(gate.netlist());
-    let local_stop = SensorPins::of(&netlist).local_stop;
+    let local_stop = SensorPins::find(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
     // Edges of the bins of both windows, the earlier one's first.
@@ -258,16 +258,16 @@ fn two_windows(
 
     checks.equal(
         "start values loaded",
-        shown(&Some(starts)),
-        shown(&gate.loaded().into_iter().collect::<Option<Vec<u16>>>()),
+        counts_text(&Some(starts)),
+        counts_text(&gate.loaded().into_iter().collect::<Option<Vec<u16>>>()),
     );
     let histograms = gate.histograms().ok();
     for (pixel, &start) in starts.iter().enumerate() {
         let found = histograms.as_ref().map(|h| &h[pixel]);
         checks.equal(
             format!("start value {start}: histogram, against the window law"),
-            shown(&Some(by_law(&config, &exposure, start, &pulses))),
-            shown(&found),
+            counts_text(&Some(by_law(&config, &exposure, start, &pulses))),
+            counts_text(&found),
         );
     }
     let (later, earlier) = match &histograms {
@@ -275,7 +275,7 @@ fn two_windows(
         None => (&[][..], &[][..]),
     };
     let is_telling = later.iter().any(|&n| n != later[0]);
-    checks.that(
+    checks.add_verdict(
         format!(
             "bins 0 up of {} are bins {shift} up of {}",
             starts[0], starts[1]
@@ -292,7 +292,7 @@ fn two_windows(
         // Each edge of CLK is rounded to a femtosecond.
         let expected = exposure.clock.periods(shift as i64);
         let found = *later - *earlier;
-        checks.that(
+        checks.add_verdict(
             format!(
                 "laser cycle {cycle}: LOCAL_STOP {} before that of {}",
                 starts[1], starts[0]
@@ -328,7 +328,7 @@ fn view(
         &["CLK", "STOP", "ENABLE"]
     };
     let pins = pins.iter().copied().map(Entry::binary);
-    let mut groups = vec![Group::new("Global signals", pins)];
+    let mut groups = vec![SignalGroup::new("Global signals", pins)];
     let is_there = |entry: &Entry| netlist.signal(&entry.path).is_some();
     for (col, start) in starts.into_iter().enumerate() {
         let pixel = array::pixel_name(0, col);
@@ -352,7 +352,7 @@ fn view(
         };
         let bins = bins.into_iter();
         let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
-        groups.push(Group::new(
+        groups.push(SignalGroup::new(
             format!("Macropixel {}: start value {start} ({figure})", col + 1),
             signals.into_iter().filter(is_there).chain(bins),
         ));
@@ -388,7 +388,7 @@ fn bin_edge(checks: &mut Checks) {
     for offset_fs in -2..=2 {
         let time = edge + Time::from_fs(offset_fs);
         let mut pulse = [SpadEvent { time, spad: 7 }];
-        let found = counted(&config, &exposure, start, &mut pulse);
+        let found = gate_counts(&config, &exposure, start, &mut pulse);
         let bins = |counts: &[u16]| -> Vec<usize> {
             (0..counts.len()).filter(|&b| counts[b] > 0).collect()
         };
@@ -397,8 +397,8 @@ fn bin_edge(checks: &mut Checks) {
                 "photon {offset_fs:+} fs from the edge of bins {} and {bin}: bin",
                 bin - 1
             ),
-            shown(&Some([if offset_fs < 0 { bin - 1 } else { bin }])),
-            shown(&found.map(|counts| bins(&counts))),
+            counts_text(&Some([if offset_fs < 0 { bin - 1 } else { bin }])),
+            counts_text(&found.map(|counts| bins(&counts))),
         );
     }
 }
@@ -421,18 +421,18 @@ fn full_bins(checks: &mut Checks) {
             })
             .collect();
         let hits = pulses.len() as u64;
-        let found = counted(&config, &exposure, start, &mut pulses);
+        let found = gate_counts(&config, &exposure, start, &mut pulses);
         checks.equal(
             format!(
                 "{hits} photons in a bin of {} bits, overflow = {overflow:?}",
                 config.bin_bits
             ),
-            shown(&Some(histogram::model(
+            counts_text(&Some(histogram::model(
                 hits,
                 config.bin_bits as u32,
                 overflow,
             ))),
-            shown(&found.map(|counts| counts[bin as usize])),
+            counts_text(&found.map(|counts| counts[bin as usize])),
         );
     }
 }
@@ -471,15 +471,15 @@ fn coincidences(sensor: &SensorConfig, checks: &mut Checks) {
         let expected: Vec<u16> = (0..config.bins)
             .map(|bin| correlation::model(spads(bin), event_type, threshold) as u16)
             .collect();
-        let found = counted(&config, &exposure, start, &mut pulses);
+        let found = gate_counts(&config, &exposure, start, &mut pulses);
         checks.equal(
             format!(
                 "0 to {} coincident photons, TYPE = {event_type:?} than {threshold}",
                 config.bins - 1
             )
             .replace("Equal than", "Equal to"),
-            shown(&Some(expected)),
-            shown(&found),
+            counts_text(&Some(expected)),
+            counts_text(&found),
         );
     }
 }
@@ -495,36 +495,36 @@ fn cancelling_pulses(checks: &mut Checks) {
     let (law, window) = window(&config, &exposure, start);
     let centre = middle(&law, &window, 0, bin);
     let apart = Time::from_ps(500);
-    let at = |time, spad| SpadEvent { time, spad };
+    let pulse = |time, spad| SpadEvent { time, spad };
     let bin_start = law.bin_interval(&window, 0, bin).start;
     let cases = [
-        ("one pulse of a SPAD", vec![at(centre, 3)], 0, 1),
+        ("one pulse of a SPAD", vec![pulse(centre, 3)], 0, 1),
         (
             "two pulses of one SPAD within one CLK period cancel",
-            vec![at(centre - apart, 3), at(centre + apart, 3)],
+            vec![pulse(centre - apart, 3), pulse(centre + apart, 3)],
             0,
             0,
         ),
         (
             "pulses of two SPADs within one CLK period are one event",
-            vec![at(centre - apart, 3), at(centre + apart, 4)],
+            vec![pulse(centre - apart, 3), pulse(centre + apart, 4)],
             0,
             1,
         ),
         (
             "two pulses of one SPAD on either side of a bin's edge",
-            vec![at(bin_start - apart, 3), at(bin_start + apart, 3)],
+            vec![pulse(bin_start - apart, 3), pulse(bin_start + apart, 3)],
             1,
             1,
         ),
     ];
     for (what, mut pulses, before, within) in cases {
-        let found = counted(&config, &exposure, start, &mut pulses);
+        let found = gate_counts(&config, &exposure, start, &mut pulses);
         let bin = bin as usize;
         checks.equal(
             format!("{what}: bins {} and {bin}", bin - 1),
-            shown(&Some([before, within])),
-            shown(&found.map(|counts| [counts[bin - 1], counts[bin]])),
+            counts_text(&Some([before, within])),
+            counts_text(&found.map(|counts| [counts[bin - 1], counts[bin]])),
         );
     }
 }

@@ -26,7 +26,7 @@ use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::testbenches::testbench::GivenSensor;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Start values of Fig. 54, and of what is loaded afterwards, where they fit.
 const FIG_54: [u64; 2] = [5, 9];
@@ -68,7 +68,7 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
             .uneven()
             .map_or("a law".to_owned(), |why| why.to_string());
         let what = "LOCAL_STOP by COUNTER_INIT";
-        checks.that(what, "a law", uneven, law.uneven().is_none());
+        checks.add_verdict(what, "a law", uneven, law.uneven().is_none());
     }
     figure_54(&bench, waves, checks)?;
     every_start_value(&bench, checks);
@@ -120,7 +120,7 @@ impl Bench {
             && config.step_periods == 1
             && config.p_counter_block.is_none();
         let netlist = circuit(&config);
-        let probes = Probes::at(&netlist, "");
+        let probes = Probes::below_instance(&netlist, "");
         let net = |probe| probes.net(probe);
         Bench {
             clk: net(Probe::Clk),
@@ -137,7 +137,7 @@ impl Bench {
             inner: is_known
                 .then(|| [Probe::Memory, Probe::CounterOut].map(|p| probes.bus(p).to_vec())),
             local_stop: net(Probe::LocalStop),
-            timing: ChipTiming::of(&config),
+            timing: ChipTiming::new(&config),
             config,
             netlist,
         }
@@ -202,14 +202,14 @@ impl Bench {
                 let last = found.iter().copied().max();
                 let fits = !found.is_empty() && found.iter().all(|&t| edge < t && t <= expected);
                 let last = last.map_or("never".to_owned(), |last| last.to_string());
-                checks.that(what, format!("at most {expected}"), last, fits);
+                checks.add_verdict(what, format!("at most {expected}"), last, fits);
             }
         }
     }
 }
 
 fn first_edge(config: &SensorConfig, start: u64) -> Option<i64> {
-    Some(p_counter::Rises::of(config, start as u16)?.first)
+    Some(p_counter::Rises::from_start_value(config, start as u16)?.first)
 }
 
 /// P-counter and timing block, connected as in a macropixel.
@@ -318,10 +318,10 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         );
         let is_new = found.0 != found.1 && found.1 == Some(value);
         let what = format!("MEMORY, clk-to-Q after MEMORY_LOAD rises with {value}");
-        checks.that(what, value, shown(found.1), is_new);
+        checks.add_verdict(what, value, number_text(found.1), is_new);
         let what = format!("COUNTER_OUT follows it to {value} without COUNTER_CLK");
         let found = recorder.number_at(counter_out, after + timing.stop_to_reset);
-        checks.equal(what, shown(Some(value)), shown(found));
+        checks.equal(what, number_text(Some(value)), number_text(found));
     }
     let local_stops = recorder.rising_edges(bench.local_stop);
     let falls = recorder.falling_edges(bench.local_stop);
@@ -352,10 +352,10 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         if let Some([_, counter_out]) = &bench.inner {
             let found = recorder.number_at(counter_out, in_reset);
             let what = format!("cycle {cycle}: COUNTER_OUT when COUNTER_RESET falls");
-            checks.equal(what, shown(Some(start)), shown(found));
+            checks.equal(what, number_text(Some(start)), number_text(found));
 
             // Every count is read half a period after its edge, when the ripple is over.
-            let mut model = p_counter::Model::new(&bench.config, start as u16);
+            let mut model = p_counter::PCounterModel::new(&bench.config, start as u16);
             let expected = std::iter::from_fn(|| {
                 (!model.local_stop()).then(|| {
                     model.clock();
@@ -429,7 +429,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let fallen_since = falls.iter().filter(|&&t| t > last_rise).count();
     let quiet = recorder.falling_edges(bench.clk);
     let quiet = quiet.iter().filter(|&&t| t > last_rise).count();
-    checks.that(
+    checks.add_verdict(
         "CLK periods without STOP for which LOCAL_STOP stays high",
         format!("at least {hold_periods}"),
         quiet,
@@ -460,8 +460,8 @@ fn view(netlist: &Netlist, first_stop: Time, last: Time) -> Layout {
     let is_there = |entry: &Entry| netlist.signal(&entry.path).is_some();
     Layout {
         groups: vec![
-            Group::new("Global signals", inputs),
-            Group::new("P-counter (Fig. 54)", counter.into_iter().filter(is_there)),
+            SignalGroup::new("Global signals", inputs),
+            SignalGroup::new("P-counter (Fig. 54)", counter.into_iter().filter(is_there)),
         ],
         zoom: (Time::ZERO, last),
         marker: Some(first_stop),
@@ -475,18 +475,18 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     const AFTER_BORROW: i64 = 3;
     let (config, timing) = (&bench.config, &bench.timing);
     let exposure = Exposure::new(config, 2, 1);
-    let at = |period: i64| bench.origin + exposure.falling(period);
+    let falling_clk = |period: i64| bench.origin + exposure.falling(period);
     let mut drives = bench.power_up();
     let mut cycles = Vec::new();
     let mut period = 0;
     for start in 0..=config.largest_start() as i64 {
-        drives.push(Drive::new(at(period), bench.enable, false));
-        bench.load(&mut drives, at(period), start as u64);
+        drives.push(Drive::new(falling_clk(period), bench.enable, false));
+        bench.load(&mut drives, falling_clk(period), start as u64);
         period += LOAD_PERIODS;
-        drives.push(Drive::new(at(period), bench.enable, true));
+        drives.push(Drive::new(falling_clk(period), bench.enable, true));
         for _ in 0..2 {
-            drives.push(Drive::new(at(period), bench.stop, true));
-            drives.push(Drive::new(at(period + 1), bench.stop, false));
+            drives.push(Drive::new(falling_clk(period), bench.stop, true));
+            drives.push(Drive::new(falling_clk(period + 1), bench.stop, false));
             let first = bench.first_edge(start as u64);
             cycles.extend(first.map(|first| (first, period)));
             period += first.unwrap_or(0) + AFTER_BORROW;
@@ -503,14 +503,18 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     let mut recorder = Recorder::new(counter_out.chain([bench.local_stop]));
     bench
         .kernel()
-        .run(&mut Stimulus::sorted(drives), at(period), &mut recorder)
+        .run(
+            &mut Stimulus::sorted(drives),
+            falling_clk(period),
+            &mut recorder,
+        )
         .expect("no loop of cells without delay");
 
     let mut rises = recorder.rising_edges(bench.local_stop);
     if config.after_borrow == AfterBorrow::Wrap {
         // Of each laser cycle the first: a short counter comes round before the next STOP.
         let mut last = None;
-        let cycle_of = |t: &Time| cycles.partition_point(|&(_, stop)| at(stop) <= *t);
+        let cycle_of = |t: &Time| cycles.partition_point(|&(_, stop)| falling_clk(stop) <= *t);
         rises.retain(|rise| last.replace(cycle_of(rise)) != Some(cycle_of(rise)));
     }
     let expected = cycles.len();
@@ -519,7 +523,8 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
         config.largest_start()
     );
     checks.equal(what, expected, rises.len());
-    let ripple = |(&rise, &(first, stop)): (&Time, &(i64, i64))| rise - at(stop + first + 1);
+    let ripple =
+        |(&rise, &(first, stop)): (&Time, &(i64, i64))| rise - falling_clk(stop + first + 1);
     let ripples: Vec<Time> = rises.iter().zip(&cycles).map(ripple).collect();
     let what = "ripple, CLK fall start + 1 to LOCAL_STOP, of all";
     bench.takes(what, checks, Time::ZERO, timing.ripple(), &ripples);
@@ -531,7 +536,7 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     let off = (worst - PUBLISHED).as_s() / PUBLISHED.as_s();
     let default = SensorConfig::default();
     if (config.counter_bits, config.corner) == (default.counter_bits, default.corner) {
-        checks.that(
+        checks.add_verdict(
             "worst ripple against the published one (4.6, Fig. 56)",
             format!("{PUBLISHED} within 1 %"),
             format!("{worst}, {:+.2} %", 100.0 * off),
@@ -541,7 +546,7 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
 
     // Outputs on their way back to the start value are edges for the next stage, too.
     let last_change = |stop: i64| {
-        let stop = at(stop);
+        let stop = falling_clk(stop);
         let changes = recorder.changes();
         let until = changes.partition_point(|c| c.0 <= stop + exposure.clock.half_periods(1));
         let back = changes[..until]
@@ -552,7 +557,7 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
     };
     let settled = cycles.iter().map(|&(_, stop)| last_change(stop)).max();
     let settled = settled.unwrap_or(Time::MAX);
-    checks.that(
+    checks.add_verdict(
         "latest change of COUNTER_OUT by a reset, after STOP",
         format!(
             "before {}, COUNTER_RESET's fall",
@@ -564,11 +569,11 @@ fn every_start_value(bench: &Bench, checks: &mut Checks) {
 }
 
 /// A number, or X.
-fn shown(number: Option<u64>) -> String {
+fn number_text(number: Option<u64>) -> String {
     number.map_or("X".to_owned(), |n| n.to_string())
 }
 
 /// Numbers in a row.
 fn sequence(numbers: impl Iterator<Item = Option<u64>>) -> String {
-    numbers.map(shown).collect::<Vec<_>>().join(" ")
+    numbers.map(number_text).collect::<Vec<_>>().join(" ")
 }

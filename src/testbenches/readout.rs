@@ -25,7 +25,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Shown before the readout begins.
 const PAUSE: Time = Time::from_ns(50);
@@ -75,7 +75,7 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         readout_pins: 2,
         ..SensorConfig::default()
     };
-    let order = ReadoutOrder::of(&config);
+    let order = ReadoutOrder::new(&config);
     let exposure = Exposure::new(&config, 64, 16);
     let starts: Vec<u16> = (0..config.pixels() as u16).map(|i| 20 + 3 * i).collect();
     let next: Vec<u16> = starts.iter().map(|start| 511 - start).collect();
@@ -86,10 +86,10 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let size = (config.rows, config.cols);
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), size, &starts, &photons);
     let netlist = std::sync::Arc::clone(gate.netlist());
-    let pins = ReadPins::of(&netlist);
+    let pins = ReadPins::find(&netlist);
     let (word_load, load_clk) = (
         ReadProbe::WordLoad.net(&netlist),
-        LoadPins::of(&netlist).clk,
+        LoadPins::find(&netlist).clk,
     );
     let mut recorder = Recorder::new([pins.clk, pins.enable, word_load, load_clk]);
     let counted = gate.schedule().counted;
@@ -107,7 +107,7 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let sum = |counts: &[u16]| counts.iter().map(|&n| u64::from(n)).sum::<u64>();
     match (counters, read) {
         (Ok(counters), Ok(read)) => {
-            checks.that(
+            checks.add_verdict(
                 "counts of the exposure",
                 "more than 0",
                 sum(counters.counts()).to_string(),
@@ -145,7 +145,7 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     );
     let last_load = recorder.rising_edges(load_clk).into_iter().next_back();
     let last_load = last_load.unwrap_or(Time::ZERO);
-    checks.that(
+    checks.add_verdict(
         "the load ends before the readout",
         "yes",
         format!("{} before it", reads[reads.len() - 1] - last_load),
@@ -167,12 +167,12 @@ fn clocks(checks: &mut Checks) {
         readout_pins: 1,
         ..SensorConfig::default()
     };
-    let netlists = PinNetlists::of(&config);
+    let netlists = PinNetlists::new(&config);
     let most = ((1u32 << config.bin_bits) - 1) as u16;
     let counts: Vec<u16> = (0..config.pixels() * config.bins)
         .map(|i| (i as u16).wrapping_mul(0x9e37) & most)
         .collect();
-    let order = ReadoutOrder::of(&config);
+    let order = ReadoutOrder::new(&config);
     for mhz in CLOCKS_MHZ {
         let found = netlists.run_at(mhz, &config, &counts);
         let (load, read) = (found.load.as_s() * 1e6, found.read.as_s() * 1e6);
@@ -180,7 +180,7 @@ fn clocks(checks: &mut Checks) {
         let expected = [config.load_bits(), order.periods()].map(|n| clock.periods(n as i64));
         let off = |a: Time, b: Time| (a - b).as_fs().abs();
         let is_exact = off(found.load, expected[0]) <= 1 && off(found.read, expected[1]) <= 1;
-        checks.that(
+        checks.add_verdict(
             format!("4 x 8, one pin, {mhz} MHz: load and readout, us"),
             "all right, a period a bit",
             format!("{load:7.2} {read:7.2}"),
@@ -193,12 +193,12 @@ fn clocks(checks: &mut Checks) {
 fn whole_array(checks: &mut Checks) {
     let config = SensorConfig::default();
     let counts = sparse_counts(&config);
-    let netlists = PinNetlists::of(&config);
-    let pins = ReadoutOrder::of(&config).pins();
+    let netlists = PinNetlists::new(&config);
+    let pins = ReadoutOrder::new(&config).pins();
     for mhz in CLOCKS_MHZ {
         let found = netlists.run_at(mhz, &config, &counts);
         let (load, read) = (found.load.as_s() * 1e6, found.read.as_s() * 1e6);
-        checks.that(
+        checks.add_verdict(
             format!("64 x 64, {pins} pins, {mhz} MHz: load and readout, us (4.7)"),
             "all right, load shorter",
             format!("{load:7.2} {read:7.2}"),
@@ -213,7 +213,7 @@ fn whole_array(checks: &mut Checks) {
         config.readout_time() < config.load_time()
     });
     let bits = config.histogram_bits() as f64 / config.load_bits() as f64;
-    checks.that(
+    checks.add_verdict(
         "pins from which on a load outlasts the readout at the same clock",
         format!("more than {bits:.1}, the ratio of bits"),
         least.map_or("none".to_owned(), |pins| pins.to_string()),
@@ -225,7 +225,7 @@ fn whole_array(checks: &mut Checks) {
 fn view(config: &SensorConfig, counted: Time) -> Layout {
     let word = config
         .read_clock()
-        .periods(ReadoutOrder::of(config).word_periods() as i64);
+        .periods(ReadoutOrder::new(config).word_periods() as i64);
     let readout = [
         Entry::binary(ReadProbe::Enable.path()),
         Entry::binary(ReadProbe::Clk.path()),
@@ -245,14 +245,14 @@ fn view(config: &SensorConfig, counted: Time) -> Layout {
         Entry::binary(LoadProbe::MemoryLoad.path()),
     ];
     let mut groups = vec![
-        Group::new("Readout (4.2)", readout),
-        Group::new("Load meanwhile (4.7)", load),
+        SignalGroup::new("Readout (4.2)", readout),
+        SignalGroup::new("Load meanwhile (4.7)", load),
     ];
     for col in 0..config.cols {
         let pixel = array::pixel_name(0, col);
         let bins = (0..3).map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
         let memory = [Entry::decimal(Probe::Memory.path(&pixel))];
-        groups.push(Group::new(
+        groups.push(SignalGroup::new(
             format!("Macropixel {pixel}"),
             bins.chain(memory),
         ));

@@ -33,7 +33,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 /// Start value of both macropixels.
 const START: u16 = 20;
@@ -80,7 +80,7 @@ fn bins() -> Vec<usize> {
 }
 
 /// What one macropixel made of it.
-struct Captured {
+struct CapturedHits {
     /// Counts; none where a bit is unknown.
     counts: Vec<Option<u64>>,
     /// Laser cycles by how many HITs the photon left: none, one, two, and cycles with an unknown HIT.
@@ -89,7 +89,7 @@ struct Captured {
 
 /// Both macropixels, and what the timing checks say.
 struct Outcome {
-    pixels: Vec<Captured>,
+    pixels: Vec<CapturedHits>,
     /// Paths of the HIT flip-flops of both.
     hit_cells: [Vec<String>; 2],
     report: CheckReport,
@@ -116,7 +116,7 @@ fn delays(netlist: &Netlist) -> Timing {
     let mut timing = nominal;
     for cell in 0..netlist.cells().len() {
         if netlist.cell_path(cell).contains(&second) {
-            timing.set(cell, *mismatched.of(cell));
+            timing.set(cell, *mismatched.cell_delays(cell));
         }
     }
     timing
@@ -191,7 +191,7 @@ fn expose(
             }] += 1;
         }
         let number = |nets: &Vec<NetId>| recorder.number_at(nets, schedule.end);
-        Captured {
+        CapturedHits {
             counts: probes.bins().iter().map(number).collect(),
             hits,
         }
@@ -220,13 +220,13 @@ fn outcome(period: Time, policy: Policy) -> Outcome {
 /// What the right capture counts, and what one that is a period late does.
 fn expected(is_late: bool) -> Vec<Option<u64>> {
     let bins = config().bins;
-    let of = |bin: usize| if bin < bins { photons(bin) as u64 } else { 0 };
+    let bin_photons = |bin: usize| if bin < bins { photons(bin) as u64 } else { 0 };
     (0..bins)
-        .map(|bin| Some(of(bin + is_late as usize)))
+        .map(|bin| Some(bin_photons(bin + is_late as usize)))
         .collect()
 }
 
-fn shown<T: Debug>(counts: &[Option<T>]) -> String {
+fn counts_text<T: Debug>(counts: &[Option<T>]) -> String {
     let count = |c: &Option<T>| c.as_ref().map_or("X".to_owned(), |n| format!("{n:?}"));
     counts.iter().map(count).collect::<Vec<_>>().join(" ")
 }
@@ -239,8 +239,8 @@ fn far_from_the_crossing(checks: &mut Checks) {
         for (pixel, captured) in found.pixels.iter().enumerate() {
             checks.equal(
                 format!("{mhz} MHz, {}: counts", array::pixel_name(0, pixel)),
-                shown(&expected(is_late)),
-                shown(&captured.counts),
+                counts_text(&expected(is_late)),
+                counts_text(&captured.counts),
             );
         }
         checks.equal(format!("{mhz} MHz: violations"), 0, found.report.violated());
@@ -250,7 +250,7 @@ fn far_from_the_crossing(checks: &mut Checks) {
 /// The shortest period with the right histogram, by simulation, against static timing.
 fn crossing(checks: &mut Checks) {
     let silicon = Silicon::nominal(Corner::Typ);
-    let paths = MacropixelTiming::of(&config(), &silicon, Limits::Ignored, (0, 0));
+    let paths = MacropixelTiming::analyse(&config(), &silicon, Limits::Ignored, (0, 0));
     let counts = |period| {
         outcome(period, Policy::ReportOnly)
             .pixels
@@ -268,11 +268,11 @@ fn crossing(checks: &mut Checks) {
     );
     checks.equal(
         "1 ps below it: counts, all moved by one bin",
-        shown(&expected(true)),
-        shown(&counts(found - Time::from_ps(1))),
+        counts_text(&expected(true)),
+        counts_text(&counts(found - Time::from_ps(1))),
     );
     let in_band = outcome(found + Time::from_ps(1), Policy::ReportOnly);
-    checks.that(
+    checks.add_verdict(
         "1 ps above it: hold violations that an ideal flip-flop hides",
         "some",
         in_band.violations(0),
@@ -281,12 +281,12 @@ fn crossing(checks: &mut Checks) {
 }
 
 /// Which HITs of the second macropixel see SHIFT before it changes, at a period between them.
-fn between() -> (Time, Vec<bool>) {
+fn hits_between() -> (Time, Vec<bool>) {
     let silicon = Silicon {
         mismatch: Some(MISMATCH),
         ..Silicon::nominal(Corner::Typ)
     };
-    let paths = MacropixelTiming::of(&config(), &silicon, Limits::Ignored, (0, 1));
+    let paths = MacropixelTiming::analyse(&config(), &silicon, Limits::Ignored, (0, 1));
     let hit_cells = paths.probes.hit_cells(&paths.netlist);
     let strobe_after_shift = |bin: usize| {
         let of_hit = paths.hits.iter().filter(|r| r.kind == CheckKind::Hold);
@@ -302,7 +302,7 @@ fn between() -> (Time, Vec<bool>) {
 
 /// At the crossing itself: with ideal flip-flops, and with flip-flops that go unknown.
 fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    let (period, sees_old) = between();
+    let (period, sees_old) = hits_between();
     let bins = bins();
     let look = |stop: &dyn Fn(i64) -> Time| view(stop, period, &sees_old);
     let found = expose(period, Policy::ReportOnly, Some(waves), look)?;
@@ -314,8 +314,8 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
         .collect();
     checks.equal(
         format!("{period}, mp_r0_c1: counts, by which HIT sees the old SHIFT"),
-        shown(&predicted),
-        shown(&found.pixels[1].counts),
+        counts_text(&predicted),
+        counts_text(&found.pixels[1].counts),
     );
     // A photon of bin b is in HIT b before the change and in HIT b − 1 after it.
     let left = |&bin: &usize| sees_old[bin] as usize + (bin > 0 && !sees_old[bin - 1]) as usize;
@@ -323,10 +323,10 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
     for (hits, what) in [(0, "lost"), (2, "doubled")] {
         let (expected, found) = (with(hits), found.pixels[1].hits[hits]);
         let what = format!("{period}, mp_r0_c1: photons {what}, of {}", bins.len());
-        checks.that(what, expected, found, expected == found && found > 0);
+        checks.add_verdict(what, expected, found, expected == found && found > 0);
     }
     let violated = found.violations(1);
-    checks.that(
+    checks.add_verdict(
         format!("{period}, mp_r0_c1: HIT flip-flops that broke setup or hold"),
         "one or two a photon",
         violated,
@@ -347,8 +347,8 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
     );
     checks.equal(
         format!("{period}, mp_r0_c1, checks x: counts"),
-        shown::<u64>(&vec![None; config().bins]),
-        shown(&captured.counts),
+        counts_text::<u64>(&vec![None; config().bins]),
+        counts_text(&captured.counts),
     );
     Ok(())
 }
@@ -361,7 +361,7 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
     let cycle = bins().iter().position(|&bin| bin == doubled).unwrap_or(0) as i64;
     // The falling edge that is counted last, and the half period that the strobe takes.
     let strobe = stop(cycle) + period * (START as i64 + 1) + Time::from_fs(period.as_fs() / 2);
-    let mut groups = vec![Group::new(
+    let mut groups = vec![SignalGroup::new(
         "Global signals",
         ["CLK", "STOP"].map(Entry::binary),
     )];
@@ -382,7 +382,7 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
             .iter()
             .map(|&bin| Entry::decimal(probes::bin_path(&pixel, bin)));
         let title = format!("{pixel}: {title} (Fig. 56)");
-        groups.push(Group::new(title, signals.into_iter().chain(bins)));
+        groups.push(SignalGroup::new(title, signals.into_iter().chain(bins)));
     }
     Layout {
         groups,

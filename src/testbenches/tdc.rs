@@ -15,7 +15,7 @@ mod waveform;
 
 use std::path::Path;
 
-use self::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
+use self::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, build};
 use crate::analysis::Linearity;
 use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
 use crate::files::InputError;
@@ -72,7 +72,7 @@ struct Tdc {
 }
 
 fn clocked() -> Tdc {
-    let (netlist, timing) = made(&clock_counter::circuit(BITS), SIGMA, 1);
+    let (netlist, timing) = build(&clock_counter::circuit(BITS), SIGMA, 1);
     let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
     Tdc {
         name: "clock counter",
@@ -88,8 +88,8 @@ fn clocked() -> Tdc {
 }
 
 fn ring() -> Tdc {
-    let (netlist, timing) = made(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
-    let model = ring_oscillator::Model::of(&netlist, &timing, "");
+    let (netlist, timing) = build(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
+    let model = ring_oscillator::RingOscillatorModel::from_netlist(&netlist, &timing, "");
     Tdc {
         name: "ring oscillator",
         seed: 2,
@@ -104,7 +104,7 @@ fn ring() -> Tdc {
 }
 
 fn line() -> Tdc {
-    let (netlist, timing) = made(&delay_line::circuit(CODES), SIGMA, 1);
+    let (netlist, timing) = build(&delay_line::circuit(CODES), SIGMA, 1);
     let steps = delay_line::model(&netlist, &timing, "");
     Tdc {
         name: "delay line",
@@ -145,7 +145,11 @@ impl Tdc {
             .enumerate()
             .filter(|(_, cell)| cell.kind == CellKind::Inv);
         let (inverter, _) = inverters.next().expect("it inverts CLK");
-        let late = Time::from_fs(self.timing.of(inverter)[0][0].to(Logic::One).into());
+        let late = Time::from_fs(
+            self.timing.cell_delays(inverter)[0][0]
+                .delay_fs(Logic::One)
+                .into(),
+        );
         let first = (from.as_s() * clock.as_hz()) as i64 - 2;
         let falls = (first..).map(move |k| clock.half_periods(2 * k + 1) + late);
         falls.take_while(move |&fall| fall < to)
@@ -239,14 +243,14 @@ impl Tdc {
         // Codes between the first and the last have both edges within the range.
         let inner = &counts[1..CODES];
         Density {
-            linearity: Linearity::of(inner),
+            linearity: Linearity::from_widths(inner),
             counts,
         }
     }
 
     /// What the elements' delays say.
     fn expected(&self) -> Linearity {
-        Linearity::of(&self.steps.widths_s())
+        Linearity::from_widths(&self.steps.widths_s())
     }
 }
 
@@ -291,7 +295,7 @@ fn compare(tdc: &Tdc, density: &Density, checks: &mut Checks) {
     let (worst, code) = sigmas
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .expect("there are codes");
-    checks.that(
+    checks.add_verdict(
         format!("{}: DNL of every code against its delays", tdc.name),
         "within 5 standard errors",
         format!("{worst:.1} at code {code}"),
@@ -300,7 +304,7 @@ fn compare(tdc: &Tdc, density: &Density, checks: &mut Checks) {
     let total: f64 = density.counts.iter().sum();
     let share = density.linearity.step / total * tdc.range.as_s();
     let off = share / expected.step - 1.0;
-    checks.that(
+    checks.add_verdict(
         format!("{}: mean step", tdc.name),
         format!("{:.2} ps", expected.step * 1e12),
         format!("{:.2} ps", share * 1e12),
@@ -309,7 +313,7 @@ fn compare(tdc: &Tdc, density: &Density, checks: &mut Checks) {
 }
 
 fn charts(waves: &Path, converters: &[Tdc], densities: &[Density]) -> Result<(), InputError> {
-    let chart = |what: &str, of: fn(&Linearity) -> &[f64]| {
+    let chart = |what: &str, steps: fn(&Linearity) -> &[f64]| {
         let x = Axis::linear("code");
         let mut chart = Chart::new(
             format!(
@@ -321,7 +325,7 @@ fn charts(waves: &Path, converters: &[Tdc], densities: &[Density]) -> Result<(),
         );
         for (tdc, density) in converters.iter().zip(densities) {
             let points = |linearity: &Linearity| -> Vec<(f64, f64)> {
-                let codes = of(linearity).iter().enumerate();
+                let codes = steps(linearity).iter().enumerate();
                 codes
                     .map(|(code, &value)| (code as f64 + 1.0, value))
                     .collect()

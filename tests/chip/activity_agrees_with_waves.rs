@@ -9,7 +9,7 @@ use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::Activity;
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Selection, VcdWriter};
+use guided_dtof::waves::{VcdWriter, WaveSelection};
 use rand::{SeedableRng, rngs::StdRng};
 
 use crate::every_edge::waves::Waves;
@@ -30,7 +30,7 @@ fn in_an_exposed_sensor() {
         let pulses = scenario.pulses();
         let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 2), starts, &pulses);
         let netlist = gate.netlist().clone();
-        let all = Selection::all().with_anonymous();
+        let all = WaveSelection::all().with_anonymous();
         let mut dump = VcdWriter::new(Vec::new(), &netlist, &all).unwrap();
         let mut activity = Activity::new(&netlist, Time::ZERO);
         gate.run(&mut (&mut dump, &mut activity));

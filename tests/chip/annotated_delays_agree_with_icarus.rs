@@ -13,7 +13,7 @@ use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
-use icarus::{Seen, random_delays};
+use icarus::{IcarusChanges, random_delays};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 /// Compares one random macropixel with the delays of an SDF file; gives its LOCAL_STOP times after the first STOP.
@@ -49,15 +49,15 @@ fn compare(seed: u64, sdf: impl FnOnce(&Netlist, &Timing, &mut StdRng) -> String
     let plan = StimulusPlan::new(&config, &exposure, 1, &starts, &pulses);
     export_verilog(folder.path(), &config, Some(&plan), Some(&timing)).unwrap();
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &[]);
-    let exact = Seen::by_testbench(folder.path());
+    let exact = IcarusChanges::by_testbench(folder.path());
     std::fs::write(folder.path().join("chip.sdf"), &text).unwrap();
     let standard_cells = icarus::standard_cells(config.corner);
     let said = icarus::simulate(folder.path(), &standard_cells, &["-sdf-warn"]);
     assert_eq!(said, "", "every entry finds its path");
-    let standard = Seen::by_testbench(folder.path());
+    let standard = IcarusChanges::by_testbench(folder.path());
 
     let gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &starts, &pulses);
-    let ours = Seen::by_kernel(&mut gate.with_timing(&timing), 1);
+    let ours = IcarusChanges::by_kernel(&mut gate.with_timing(&timing), 1);
     assert_eq!(exact, ours, "seed {seed}");
     assert_eq!(standard, ours, "seed {seed}, standard cells");
     ours.stops

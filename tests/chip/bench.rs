@@ -38,7 +38,7 @@ impl Bench {
     }
 
     pub fn timing(&self) -> ChipTiming {
-        ChipTiming::of(&self.config)
+        ChipTiming::new(&self.config)
     }
 
     pub fn delay(&self, kind: CellKind, pin: usize, to: Logic) -> Time {

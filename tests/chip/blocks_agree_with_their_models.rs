@@ -36,12 +36,12 @@ proptest! {
             values[pin] = !values[pin];
             bench.drive(now, names[pin], values[pin]);
             let [clk, stop, resetb, enable, local_stop] = values;
-            let model = p_counter_timing::Model { after_borrow, clk, resetb, enable, local_stop };
+            let model = p_counter_timing::PCounterTimingModel { after_borrow, clk, resetb, enable, local_stop };
             if names[pin] == "CLK" && model.counter_clk() {
                 clk_to_counter_clk.push(now + timing.clk_to_counter_clk);
             }
             if names[pin] == "STOP" && stop && !model.counter_reset() {
-                pulses.push(p_counter_timing::Model::reset_pulse(&timing, now));
+                pulses.push(p_counter_timing::PCounterTimingModel::reset_pulse(&timing, now));
             }
             now += Time::from_ps(gap_ps);
             expected.push((now - Time::from_fs(1), model));
@@ -102,7 +102,7 @@ proptest! {
         }
         let timed = bench.bus("SPAD_TIMED");
         let mut run = bench.start(&[]);
-        let mut model = front_end::summation::Model::default();
+        let mut model = front_end::summation::SummationModel::default();
         let mut pulses = pulses.into_iter().peekable();
         for k in 0..63 {
             while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise(k)) {
@@ -128,12 +128,12 @@ proptest! {
             corner,
             ..SensorConfig::default()
         };
-        let timing = ChipTiming::of(&delay_line);
+        let timing = ChipTiming::new(&delay_line);
         // In bursts, shorter than some XORs take.
-        let at = |burst: i64, within: i64| SETTLING * 2 + Time::from_ns(2) * burst + Time::from_fs(within);
+        let pulse_time = |burst: i64, within: i64| SETTLING * 2 + Time::from_ns(2) * burst + Time::from_fs(within);
         let mut pulses: Vec<(Time, u8)> = pulses
             .into_iter()
-            .map(|(spad, burst, within)| (at(burst, within), spad % spads))
+            .map(|(spad, burst, within)| (pulse_time(burst, within), spad % spads))
             .collect();
         pulses.sort_unstable();
         let mut free_from = [Time::ZERO; 64];
@@ -150,7 +150,7 @@ proptest! {
         }
         let photons = bench.net("PHOTONS");
         let mut run = bench.start(&["PHOTONS"]);
-        run.until(at(40, 0));
+        run.until(pulse_time(40, 0));
         let mut found: Vec<Time> = run.recorder.rising_edges(photons);
         found.extend(run.recorder.falling_edges(photons));
         found.retain(|&time| time > SETTLING);
@@ -192,7 +192,7 @@ proptest! {
         }
         let select = bench.bus("SELECTED");
         let mut run = bench.start(&[]);
-        let mut model = metdc_counter::Model::new(bins);
+        let mut model = metdc_counter::MetdcCounterModel::new(bins);
         for (k, &start) in (1..).zip(&starts) {
             model.clock(start);
             let expected = model.selected().map_or(0, |bin| 1u64 << bin);
@@ -293,7 +293,7 @@ proptest! {
         let expected: Vec<u64> = strobes
             .iter()
             .map(|&strobe| {
-                let mut model = metdc::Model::new(bins as u32);
+                let mut model = metdc::MetdcModel::new(bins as u32);
                 let shifted = |&k: &usize| rise(k as i64) + timing.clk_to_shift <= strobe;
                 (0..events.len()).take_while(shifted).for_each(|k| model.clock(events[k]));
                 model.hits()
@@ -367,17 +367,17 @@ fn correlate(
     // That of 16 SPADs; a tree of 64 adds two levels and bits.
     let step = timing.clk_to_event * if spads > 16 { 2 } else { 1 };
     let conditions: Vec<_> = conditions.collect();
-    let at = |k: usize| SETTLING + step * k as i64;
+    let edge_time = |k: usize| SETTLING + step * k as i64;
     for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
-        bench.number(at(k), "SPAD_TIMED", timed);
-        bench.number(at(k), "TYPE", code as u64);
-        bench.number(at(k), "THRESHOLD", threshold as u64);
+        bench.number(edge_time(k), "SPAD_TIMED", timed);
+        bench.number(edge_time(k), "TYPE", code as u64);
+        bench.number(edge_time(k), "THRESHOLD", threshold as u64);
     }
     let event = bench.net("SPAD_EVENT");
     let mut run = bench.start(&["SPAD_EVENT"]);
     for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
         let expected = correlation::model(timed, TYPES[code as usize], threshold);
-        let found = run.is_high_at(at(k + 1) - Time::from_fs(1), event);
+        let found = run.is_high_at(edge_time(k + 1) - Time::from_fs(1), event);
         assert_eq!(
             found,
             Some(expected),
@@ -429,7 +429,7 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
     let bus = |path: &str| netlist.signal(path).unwrap();
     let (timed, code, threshold) = (bus("SPAD_TIMED"), bus("TYPE"), bus("THRESHOLD"));
     let event = netlist.net("SPAD_EVENT").unwrap();
-    let step = ChipTiming::of(&SensorConfig::default()).clk_to_event;
+    let step = ChipTiming::new(&SensorConfig::default()).clk_to_event;
     let mut kernel = LaneKernel::new(&netlist, &timing);
     let mut now = Time::ZERO;
     let (mut compared, mut met) = (0u64, [0u64; 3]);
@@ -456,7 +456,7 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
                         time: now,
                         net,
                         mask: u64::MAX,
-                        values: Lanes::known(values),
+                        values: Lanes::from_bits(values),
                     })
                     .collect();
                 now += step;
@@ -473,7 +473,7 @@ fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold(
                 });
                 assert_eq!(
                     kernel.value(event),
-                    Lanes::known(expected),
+                    Lanes::from_bits(expected),
                     "{upper:#x} {event_type:?} {t}"
                 );
                 compared += 64;

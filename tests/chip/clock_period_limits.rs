@@ -21,7 +21,7 @@ fn mismatched(seed: u64) -> Silicon {
 }
 
 fn pixel(silicon: &Silicon, limits: Limits) -> MacropixelTiming {
-    MacropixelTiming::of(&SensorConfig::default(), silicon, limits, (0, 0))
+    MacropixelTiming::analyse(&SensorConfig::default(), silicon, limits, (0, 0))
 }
 
 /// Shortest period with STOP on CLK's fall, by paths and by gates.
@@ -45,8 +45,8 @@ fn the_typical_corner_has_the_published_ripple_and_period() {
     let hold = Library::generic_40nm().checks(CellKind::Dffr).hold;
     let hold = Time::from_fs(
         hold.rise
-            .at(Corner::Typ)
-            .max(hold.fall.at(Corner::Typ))
+            .in_corner_fs(Corner::Typ)
+            .max(hold.fall.in_corner_fs(Corner::Typ))
             .into(),
     );
     assert!(((kept - captured) - hold * 2).as_fs().abs() <= 1_000);
@@ -61,7 +61,7 @@ fn derated_silicon_scales_every_limit() {
     for (corner, factor) in [(Corner::Slow, 1.0), (Corner::Typ, 1.3)] {
         let silicon = Silicon {
             corner,
-            ..TYPICAL.at(factor)
+            ..TYPICAL.with_factor(factor)
         };
         let (by_paths, by_gates) = limits(&silicon, Limits::Kept);
         assert_eq!(by_paths, by_gates, "{corner:?} {factor}");
@@ -125,7 +125,7 @@ fn the_longest_correlation_path_is_reached_but_for_its_false_edges() {
         let gap = lost(CellKind::Xor2) * 2 + lost(CellKind::And2);
         for kept in [Limits::Ignored, Limits::Kept] {
             let paths = pixel(&silicon, kept);
-            let gates = CorrelationTiming::of(&config, &silicon, kept);
+            let gates = CorrelationTiming::simulate(&config, &silicon, kept);
             assert_eq!(gates.settled + gap, paths.event.as_ref().unwrap().delay());
             let (by_gates, by_paths) = (gates.period.unwrap(), paths.correlation_period().unwrap());
             assert!(by_gates <= by_paths + Time::from_ps(1));
@@ -137,7 +137,7 @@ fn the_longest_correlation_path_is_reached_but_for_its_false_edges() {
     }
     for seed in 0..20 {
         let silicon = mismatched(seed);
-        let settled = CorrelationTiming::of(&config, &silicon, Limits::Ignored).settled;
+        let settled = CorrelationTiming::simulate(&config, &silicon, Limits::Ignored).settled;
         assert!(
             settled <= pixel(&silicon, Limits::Ignored).event.unwrap().delay(),
             "seed {seed}"
@@ -176,7 +176,7 @@ fn start_values_load_right_down_to_the_shortest_load_clk_period() {
         ..SensorConfig::default()
     };
     for silicon in [TYPICAL, mismatched(3)] {
-        let by_paths = LoadTiming::of(&config, &silicon, Limits::Kept)
+        let by_paths = LoadTiming::analyse(&config, &silicon, Limits::Kept)
             .period()
             .unwrap();
         let works = load_works(&config, &silicon, Limits::Kept);
@@ -203,7 +203,7 @@ fn histograms_are_read_right_down_to_the_shortest_read_clk_period() {
             ..SensorConfig::default()
         };
         for silicon in [TYPICAL, mismatched(3)] {
-            let by_paths = ReadTiming::of(&config, &silicon, Limits::Kept).period();
+            let by_paths = ReadTiming::analyse(&config, &silicon, Limits::Kept).period();
             let by_paths = by_paths.unwrap();
             let works = read_works(&config, &silicon, Limits::Kept);
             let by_gates = shortest_period(Time::from_ns(5), &works).unwrap();
@@ -228,7 +228,7 @@ fn every_flip_flop_of_the_chip_is_asked() {
         ..SensorConfig::default()
     };
     let paths = pixel(&TYPICAL, Limits::Kept);
-    let local = LocalClocks::of(&SensorConfig::default(), &TYPICAL);
+    let local = LocalClocks::analyse(&SensorConfig::default(), &TYPICAL);
     let asked = paths
         .clk
         .iter()
@@ -258,7 +258,7 @@ fn every_flip_flop_of_the_chip_is_asked() {
         ];
         assert!(known.iter().any(|name| cell.contains(name)), "{cell}");
     }
-    let load = LoadTiming::of(&config, &TYPICAL, Limits::Kept);
+    let load = LoadTiming::analyse(&config, &TYPICAL, Limits::Kept);
     let asked: Vec<usize> = load.load_clk.iter().map(|r| r.cell).collect();
     // The first stage takes its bit from the tester.
     let left = left_out(&load.netlist, &asked);
@@ -267,7 +267,7 @@ fn every_flip_flop_of_the_chip_is_asked() {
             .all(|cell| cell.ends_with("deserialiser.shift_0")),
         "{left:?}"
     );
-    let read = ReadTiming::of(&config, &TYPICAL, Limits::Kept);
+    let read = ReadTiming::analyse(&config, &TYPICAL, Limits::Kept);
     let asked: Vec<usize> = read.read_clk.iter().map(|r| r.cell).collect();
     assert_eq!(left_out(&read.netlist, &asked), [""; 0]);
 }
@@ -296,7 +296,7 @@ fn a_macropixels_mismatch_is_its_own_and_the_spread_is_that_of_its_cells() {
     assert!(relative.abs() < 5.0 / (2.0 * count).sqrt(), "{relative}");
     let nominal = pixel(&TYPICAL, Limits::Kept).ripple.delay().as_s();
     assert!((found.mean_s - nominal).abs() < 5.0 * (expected / count).sqrt());
-    let one = MacropixelTiming::of(&config, &silicon, Limits::Kept, (3, 5));
+    let one = MacropixelTiming::analyse(&config, &silicon, Limits::Kept, (3, 5));
     assert_eq!(found.pixels[3 * 16 + 5].ripple, one.ripple.delay());
     assert_eq!(found, spread(&config, &silicon, || ()));
 }

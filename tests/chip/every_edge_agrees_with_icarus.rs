@@ -12,7 +12,7 @@ use guided_dtof::chip::{
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::{Corner, Netlist};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
-use guided_dtof::waves::{Selection, VcdWriter};
+use guided_dtof::waves::{VcdWriter, WaveSelection};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 use crate::every_edge::waves::{Figures, Waves};
@@ -26,7 +26,7 @@ const NAMES: [&str; 2] = ["the kernel", "Icarus"];
 
 /// Runs all macropixels of a small sensor, with their load path, in both simulators.
 fn compare_sensor(scenario: &Scenario) -> Figures {
-    compare_silicon(scenario, &Silicon::of(&scenario.config))
+    compare_silicon(scenario, &Silicon::new(&scenario.config))
 }
 
 /// The same with the delays of this silicon.
@@ -42,7 +42,7 @@ fn compare_silicon(scenario: &Scenario, silicon: &Silicon) -> Figures {
     let size = (config.rows, config.cols);
     let sensor = Sensor::from(config).made_of(silicon);
     let plan = StimulusPlan::new(&sensor, exposure, size.1, starts, &pulses);
-    if *silicon == Silicon::of(config) {
+    if *silicon == Silicon::new(config) {
         export_verilog(folder.path(), config, Some(&plan), None).unwrap();
     } else {
         let timing = silicon.timing(&Netlist::elaborate(&array::circuit(config)));
@@ -53,7 +53,7 @@ fn compare_silicon(scenario: &Scenario, silicon: &Silicon) -> Figures {
     let theirs = Waves::read(BufReader::new(dump), "tb.dut");
 
     let mut gate = GateSimulation::new(&sensor, exposure, (0, 0), size, starts, &pulses);
-    let selection = Selection::all().with_anonymous();
+    let selection = WaveSelection::all().with_anonymous();
     let mut writer = VcdWriter::new(Vec::new(), gate.netlist(), &selection).unwrap();
     gate.run(&mut writer);
     let end = gate.schedule().end;
@@ -113,7 +113,7 @@ fn sensors_of_another_kind() {
                 ..(*sensor).clone()
             };
             // The chip as it is, and then in any silicon.
-            let mut silicon = Silicon::of(&config);
+            let mut silicon = Silicon::new(&config);
             if seed > 0 {
                 config.corner = Corner::ALL[random.random_range(0..3)];
                 config.clk_skew_ps = random.random_range(0.0..=200.0);

@@ -70,7 +70,7 @@ proptest! {
             ..SensorConfig::default()
         };
         let mut bench = Bench::new(&front_end::circuit(&config), corner);
-        let timing = ChipTiming::of(&config);
+        let timing = ChipTiming::new(&config);
         let dead_time = Time::from_ns(2);
         let rise = |k: i64| SETTLING * 2 + Time::from_ps(period_ps) * k;
         let to_next_edge = |time: Time| {
@@ -91,7 +91,7 @@ proptest! {
         let timed = bench.bus("SPAD_TIMED");
         prop_assert_eq!(timed.len(), 1);
         let mut run = bench.start(&[]);
-        let mut model = front_end::Model::new(&config, &timing);
+        let mut model = front_end::FrontEndModel::new(&config, &timing);
         let mut pulses = pulses.into_iter().peekable();
         for k in 0..edges {
             while let Some((time, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise(k)) {
@@ -125,7 +125,7 @@ proptest! {
         };
         prop_assert_eq!(config.check(), Ok(()));
         let exposure = Exposure::new(&config, 48, 4);
-        let timing = ChipTiming::of(&config);
+        let timing = ChipTiming::new(&config);
         let to_next_edge = |time: Time| {
             let mut edges = (time.as_fs() as f64 * config.clk_hz * 1e-15) as i64 - 2..;
             edges.find_map(|edge| {
@@ -133,13 +133,13 @@ proptest! {
                 (left > Time::ZERO).then_some(left)
             }).unwrap()
         };
-        let at = |share: f64| Time::from_fs((share * exposure.end().as_fs() as f64) as i64);
-        let pulses = pulses.into_iter().map(|(spad, share)| (at(share), spad));
+        let time_at_share = |share: f64| Time::from_fs((share * exposure.end().as_fs() as f64) as i64);
+        let pulses = pulses.into_iter().map(|(spad, share)| (time_at_share(share), spad));
         let pulses = clear(pulses.collect(), &timing, config.dead_time(), to_next_edge);
         let events: Vec<SpadEvent> = pulses.iter().map(|&(time, spad)| SpadEvent { time, spad }).collect();
         let sensor = Sensor::from(&config);
         let delays = (timing, &**sensor.local_stop_delays());
-        let by_model = macropixel::Model::new(&config, delays, &exposure).histogram(start, pulses);
+        let by_model = macropixel::MacropixelModel::new(&config, delays, &exposure).histogram(start, pulses);
         let by_gates = Gate::new(&config, &exposure).histogram(start, &events);
         prop_assert_eq!(by_gates.as_ref(), Ok(&by_model));
         let refused = Window::new(&config, &exposure).histogram(start, &events);

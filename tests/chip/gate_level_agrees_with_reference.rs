@@ -1,9 +1,9 @@
 //! The netlist, the reference models and the window law agree: same LOCAL_STOP times to the femtosecond,
 //! same histograms to the count, over random sensors, clocks, STOP phases, start values and photon times.
 
-use guided_dtof::chip::macropixel::Model;
+use guided_dtof::chip::macropixel::MacropixelModel;
 use guided_dtof::chip::p_counter::starts_high;
-use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
+use guided_dtof::chip::window_law::{WindowLaw, WindowOutcome as LawWindow};
 use guided_dtof::chip::{
     AfterBorrow, EventType, Exposure, Mode, Overflow, PCounter, Probe, Sensor, SensorConfig, Tap,
 };
@@ -147,7 +147,7 @@ proptest! {
         let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
         let sensor = Sensor::from(config);
         let delays = (*sensor.timing(), &**sensor.local_stop_delays());
-        let by_model = Model::new(config, delays, &exposure).histogram(*start, pulses);
+        let by_model = MacropixelModel::new(config, delays, &exposure).histogram(*start, pulses);
         prop_assert_eq!(&by_gates, &by_model);
         let by_window = Window::new(config, &exposure).histogram(*start, &case.pulses);
         match window {
@@ -162,7 +162,7 @@ proptest! {
             let rises: Vec<Time> = rises.filter(|&t| t > Time::ZERO).collect();
             let mut expected = Vec::new();
             let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
-            Model::new(config, delays, &exposure).run(*start, pulses, |cause, _| expected.push(cause));
+            MacropixelModel::new(config, delays, &exposure).run(*start, pulses, |cause, _| expected.push(cause));
             // A reset may raise LOCAL_STOP, too, while HIT is in reset.
             let in_reset = |t: &Time| {
                 let mut cycles = 0..=i64::from(case.laser_cycles);

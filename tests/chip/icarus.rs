@@ -31,7 +31,7 @@ pub fn standard_cells(corner: Corner) -> [&'static str; 6] {
 /// Histogram counts (row, col, bin, count) and LOCAL_STOP times (row, col, fs from the first STOP on), both sorted.
 #[allow(dead_code)]
 #[derive(Debug, PartialEq, Eq)]
-pub struct Seen {
+pub struct IcarusChanges {
     /// Counts.
     pub counts: Vec<Vec<i64>>,
     /// Times.
@@ -39,7 +39,7 @@ pub struct Seen {
 }
 
 #[allow(dead_code)]
-impl Seen {
+impl IcarusChanges {
     /// By the exported testbench, which ran in `folder`.
     pub fn by_testbench(folder: &Path) -> Self {
         let table = |name: &str| {
@@ -50,7 +50,7 @@ impl Seen {
             table.sort();
             table
         };
-        Seen {
+        IcarusChanges {
             counts: table("histograms.csv"),
             stops: table("local_stops.csv"),
         }
@@ -58,11 +58,11 @@ impl Seen {
 
     /// By our kernel, which has yet to run an array of `cols` columns.
     pub fn by_kernel(gate: &mut GateSimulation, cols: usize) -> Self {
-        let local_stops = SensorPins::of(gate.netlist()).local_stop;
+        let local_stops = SensorPins::find(gate.netlist()).local_stop;
         let mut recorder = Recorder::new(local_stops.clone());
         gate.run(&mut recorder);
         let origin = gate.schedule().origin;
-        let mut seen = Seen {
+        let mut seen = IcarusChanges {
             counts: Vec::new(),
             stops: Vec::new(),
         };

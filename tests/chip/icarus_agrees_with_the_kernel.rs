@@ -6,7 +6,7 @@ use crate::scenario;
 
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
-use icarus::Seen;
+use icarus::IcarusChanges;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
 
@@ -26,9 +26,13 @@ fn compare(random: &mut StdRng, rows: usize, cols: usize) {
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &[]);
 
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (rows, cols), starts, &pulses);
-    let ours = Seen::by_kernel(&mut gate, cols);
+    let ours = IcarusChanges::by_kernel(&mut gate, cols);
     assert_eq!(gate.loaded(), scenario.loaded());
-    assert_eq!(Seen::by_testbench(folder.path()), ours, "{config:?}");
+    assert_eq!(
+        IcarusChanges::by_testbench(folder.path()),
+        ours,
+        "{config:?}"
+    );
 }
 
 #[test]

@@ -11,7 +11,8 @@ use guided_dtof::chip::{
     hslidar_delay_line, macropixel,
 };
 use guided_dtof::liberty::{
-    Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
+    CharacterisedNetlist, Clocking, write_constraints, write_mapped, write_mapped_cells,
+    write_mapped_sdf,
 };
 use guided_dtof::netlist::Netlist;
 use guided_dtof::units::Time;
@@ -52,7 +53,7 @@ fn text_of(path: &Path) -> Option<String> {
 
 /// The QuantIC4x4 with every P-counter, and HSLIDAR in both modes.
 pub fn chips() -> Vec<SensorConfig> {
-    let of = |p_counter: PCounter| SensorConfig {
+    let chip = |p_counter: PCounter| SensorConfig {
         p_counter,
         after_borrow: if p_counter.row().has_memory {
             AfterBorrow::Hold
@@ -61,7 +62,7 @@ pub fn chips() -> Vec<SensorConfig> {
         },
         ..SensorConfig::default()
     };
-    let mut chips: Vec<SensorConfig> = PCounter::ALL.into_iter().map(of).collect();
+    let mut chips: Vec<SensorConfig> = PCounter::ALL.into_iter().map(chip).collect();
     // With a shift register: OpenSTA asks less behind the exclusive ORs of the counter TDC's adders than we do.
     let hslidar = SensorConfig {
         tdc: Tdc::Clocked,
@@ -72,16 +73,16 @@ pub fn chips() -> Vec<SensorConfig> {
 }
 
 /// A macropixel in a library's cells, and a folder with cells.lib, mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc.
-pub struct Mapped {
+pub struct MappedChip {
     pub folder: tempfile::TempDir,
     pub config: SensorConfig,
     pub cells: &'static FromFile,
     pub netlist: Netlist,
-    pub characterised: Characterised,
+    pub characterised: CharacterisedNetlist,
 }
 
-impl Mapped {
-    pub fn of(text: &str, chip: SensorConfig) -> Self {
+impl MappedChip {
+    pub fn new(text: &str, chip: SensorConfig) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let liberty = folder.path().join("cells.lib");
         std::fs::write(&liberty, text).unwrap();
@@ -94,7 +95,10 @@ impl Mapped {
             ..chip
         };
         config.check().unwrap_or_else(|e| panic!("{e}"));
-        let of_library = CellLibrary::of(&config).unwrap().from_file().unwrap();
+        let of_library = CellLibrary::from_config(&config)
+            .unwrap()
+            .from_file()
+            .unwrap();
         // An `input_slew_ps` of 0 leaves the library's own.
         assert!(of_library.environment.input_slew_fs > 0.0);
         let netlist = Netlist::elaborate(&macropixel::circuit(&config));
@@ -117,7 +121,7 @@ impl Mapped {
         for (name, file) in names.into_iter().zip(files) {
             std::fs::write(folder.path().join(name), file).unwrap();
         }
-        Mapped {
+        MappedChip {
             folder,
             config,
             cells: of_library,

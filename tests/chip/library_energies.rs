@@ -3,7 +3,7 @@
 use crate::library_chips;
 use crate::tool;
 
-use guided_dtof::liberty::{Characterised, Environment, Liberty, write_mapped};
+use guided_dtof::liberty::{CharacterisedNetlist, Environment, Liberty, write_mapped};
 use guided_dtof::netlist::{CellKind, ModuleBuilder, Netlist};
 
 /// OpenSTA 2.0.17 charges both energies, of rise and fall, at every change; we charge one of them, on average.
@@ -22,7 +22,7 @@ fn of_a_chain_by_opensta() {
         }
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let environment = Environment::new(&library);
-        let made = Characterised::new(&netlist, &library, &environment);
+        let made = CharacterisedNetlist::new(&netlist, &library, &environment);
         let folder = tempfile::tempdir().unwrap();
         let mut verilog = Vec::new();
         write_mapped(&mut verilog, &netlist, &library, &made).unwrap();

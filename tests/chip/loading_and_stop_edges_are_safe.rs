@@ -1,7 +1,9 @@
 //! What may go wrong between the clocks either does no harm or is reported: loading while counting, a STOP edge
 //! anywhere in the CLK period, a reset pulse too short, two pulses of a SPAD within a period.
 
-use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, Window, WindowLaw, macropixel};
+use guided_dtof::chip::{
+    Exposure, Probe, Probes, SensorConfig, WindowLaw, WindowOutcome, macropixel,
+};
 use guided_dtof::engine::{self as fast, Cancelling, Cycle, Gate, GateSimulation, Replay};
 use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks, clock};
 use guided_dtof::netlist::{CellKind, CheckKind, Corner, Library, NetId, Netlist, Timing};
@@ -69,7 +71,12 @@ impl Bench {
         let mut kernel = Kernel::new(&netlist, &Timing::nominal(&netlist, &library, Corner::Typ));
         let local_stop = nets("LOCAL_STOP")[0];
         let mut recorder = Recorder::new([local_stop]);
-        let mut events = HardwareEvents::new(&netlist, &config, &[Probes::at(&netlist, "")], ns(3));
+        let mut events = HardwareEvents::new(
+            &netlist,
+            &config,
+            &[Probes::below_instance(&netlist, "")],
+            ns(3),
+        );
         let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ)
             .policy(Policy::ReportOnly)
             .not_before(ns(20));
@@ -105,7 +112,7 @@ impl Bench {
     fn is_right(&self, cycle: i64, start: u16) -> bool {
         let config = SensorConfig::default();
         let law = WindowLaw::new(&config, &self.exposure);
-        let Window::Open(window) = law.window(start) else {
+        let WindowOutcome::Open(window) = law.window(start) else {
             panic!("a start value within the laser cycle");
         };
         let found = self.in_cycle(cycle);
@@ -168,13 +175,13 @@ proptest! {
         let law = WindowLaw::new(&config, &exposure).window(start);
         let found = captured(&config, &exposure, start, None);
         match law {
-            Window::Open(window) => {
+            WindowOutcome::Open(window) => {
                 prop_assert_eq!(&found.violations, &[]);
                 prop_assert!(found.is_right(&exposure, window.strobe_cause));
             }
             // The law calls a race what comes within 2 fs of a limit as well.
-            Window::Race(_) => prop_assert!(!found.violations.is_empty() || found.local_stops.len() == 3),
-            Window::Never | Window::Irregular(_) => {
+            WindowOutcome::Race(_) => prop_assert!(!found.violations.is_empty() || found.local_stops.len() == 3),
+            WindowOutcome::Never | WindowOutcome::Irregular(_) => {
                 prop_assert!(false, "the laser cycle is long enough, the P-counter the default one");
             }
         }
@@ -209,7 +216,7 @@ proptest! {
         let mut found = captured(&config, &exposure, start, None);
         // One without memory raises LOCAL_STOP before the exposure, too.
         found.local_stops.retain(|&time| has_memory || time > Time::ZERO);
-        if let Window::Open(window) = law.window(start) {
+        if let WindowOutcome::Open(window) = law.window(start) {
             // As LOCAL_STOP falls in the reset pulse it may cut a pulse of COUNTER_CLK short. That counts nothing, but ends, too
             // soon for its width, up to that width after the reset.
             let timing = law.timing();
@@ -243,13 +250,13 @@ proptest! {
 
 /// What a simulated macropixel did.
 #[derive(Debug)]
-struct Found {
+struct MacropixelOutcome {
     local_stops: Vec<Time>,
     events: Vec<HardwareEventKind>,
     violations: Vec<(CheckKind, Time)>,
 }
 
-impl Found {
+impl MacropixelOutcome {
     fn is_right(&self, exposure: &Exposure, strobe_cause: Time) -> bool {
         let stops = self.local_stops.iter().enumerate();
         let mut near = stops.map(|(cycle, &t)| t - exposure.stop(cycle as i64) - strobe_cause);
@@ -259,7 +266,12 @@ impl Found {
 }
 
 /// Exposes one macropixel; the delays of its reset's delay chain are multiplied by `chain`.
-fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Option<f64>) -> Found {
+fn captured(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    chain: Option<f64>,
+) -> MacropixelOutcome {
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[start], &[&[]]);
     if let Some(factor) = chain {
         let timing = shortened(gate.netlist(), factor);
@@ -274,7 +286,7 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
     let found = events.report.hardware_events.iter();
     let report = checks.report(gate.netlist());
     let violations = report.violations.iter();
-    Found {
+    MacropixelOutcome {
         local_stops: recorder
             .rising_edges(local_stop)
             .iter()
@@ -291,7 +303,7 @@ fn shortened(netlist: &Netlist, factor: f64) -> Timing {
     let mut timing = Timing::nominal(netlist, &Library::generic_40nm(), Corner::Typ);
     for index in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
         if netlist.cells()[index].kind == CellKind::Buf {
-            let mut delays = *timing.of(index);
+            let mut delays = *timing.cell_delays(index);
             for arc in delays.as_flattened_mut() {
                 arc.rise_fs = (arc.rise_fs as f64 * factor) as u32;
                 arc.fall_fs = (arc.fall_fs as f64 * factor) as u32;
@@ -383,7 +395,7 @@ proptest! {
 
         let law = WindowLaw::new(&config, &exposure);
         let latency = law.timing().spad_to_sampled;
-        let cancelling = Cancelling::of(config.dead_time(), exposure.clock, || law).unwrap();
+        let cancelling = Cancelling::from_law(config.dead_time(), exposure.clock, || law).unwrap();
         let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[20], &[&pulses]);
         let toggled = gate.schedule().origin + latency;
         let told: Vec<(i64, String)> = cancelling

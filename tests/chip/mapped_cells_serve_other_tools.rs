@@ -1,7 +1,7 @@
 //! The library cells of `mapped_cells.v`, for tools other than Icarus: Verilator and Yosys read them, and Yosys proves each one equal to the cell that it
 //! reads from the Liberty file itself.
 
-use crate::library_chips::{self, Mapped};
+use crate::library_chips::{self, MappedChip};
 use crate::tool;
 
 use std::path::Path;
@@ -53,7 +53,7 @@ fn verilator_reads_them() {
     }
     for (name, text) in libraries() {
         for chip in chips() {
-            let mapped = Mapped::of(&text, chip);
+            let mapped = MappedChip::new(&text, chip);
             let lint = ["--lint-only", "-Wall", "--top-module", "macropixel"];
             let files = ["mapped_cells.v", "mapped.v"];
             let said = run(
@@ -167,7 +167,7 @@ fn yosys_proves_them_equal_to_the_library() {
     }
     for (name, text) in libraries() {
         for chip in chips() {
-            let mapped = Mapped::of(&text, chip);
+            let mapped = MappedChip::new(&text, chip);
             let (proven, all) = proven(mapped.folder.path());
             assert!(proven == all && all >= 8, "{name}: {proven} of {all}");
         }
@@ -182,7 +182,7 @@ fn yosys_proves_no_other_cells() {
     }
     let (name, text) = library_chips::libraries().swap_remove(0);
     let [_, hslidar] = chips();
-    let mapped = Mapped::of(&text, hslidar);
+    let mapped = MappedChip::new(&text, hslidar);
     let folder = mapped.folder.path();
     let models = mapped.text("mapped_cells.v");
     let (_, all) = proven(folder);

@@ -1,8 +1,8 @@
 //! `mapped.v` with `mapped_cells.v` and `mapped.sdf`, in Icarus Verilog, beside our kernel with the library's delays: every edge of every net of a macropixel.
 //!
 //! ```text
-//!   gate engine ─► what comes to the macropixel's pins ─┬─► Kernel, delays of `Characterised` ─┐
-//!                                                       └─► Icarus, mapped.v and mapped.sdf ───┴─► the same?
+//!   gate engine ─► what comes to the macropixel's pins ─┬─► Kernel, delays of `CharacterisedNetlist` ─┐
+//!                                                       └─► Icarus, mapped.v and mapped.sdf ──────────┴─► the same?
 //! ```
 //!
 //! Where several cells of the library stand for one of ours the kernel has one delay, the sum, rounded to whole femtoseconds; Icarus rounds each.
@@ -15,7 +15,7 @@
 
 use crate::every_edge::waves::Waves;
 use crate::icarus;
-use crate::library_chips::{self, Mapped};
+use crate::library_chips::{self, MappedChip};
 use crate::testbench::testbench;
 
 use std::collections::BTreeMap;
@@ -45,7 +45,7 @@ const APART_FS: u64 = 20;
 type Edges = Vec<(u64, String)>;
 
 /// Compares every edge from the first STOP on; how many there are, and pulses and edges that are off.
-fn compare(mapped: &Mapped, seed: u64) -> (usize, usize) {
+fn compare(mapped: &MappedChip, seed: u64) -> (usize, usize) {
     let random = &mut StdRng::seed_from_u64(seed);
     let config = &mapped.config;
     let exposure = Exposure::new(config, 70, 3);
@@ -126,7 +126,7 @@ fn compare(mapped: &Mapped, seed: u64) -> (usize, usize) {
     let theirs: BTreeMap<String, Edges> = theirs.collect();
 
     let slowest = (0..mapped.netlist.cells().len()).flat_map(|cell| {
-        let arcs = timing.of(cell).as_flattened().iter();
+        let arcs = timing.cell_delays(cell).as_flattened().iter();
         arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
             .collect::<Vec<_>>()
     });
@@ -185,8 +185,9 @@ fn edge_by_edge() {
             .filter(|chip| !chip.reset_to_load);
         for (seed, chip) in (0..).zip(chips) {
             let p_counter = chip.p_counter;
-            let mapped = Mapped::of(&text, chip);
-            let verdict = TimingVerdict::of(&mapped.config, &Silicon::of(&mapped.config), (0, 0));
+            let mapped = MappedChip::new(&text, chip);
+            let verdict =
+                TimingVerdict::analyse(&mapped.config, &Silicon::new(&mapped.config), (0, 0));
             if verdict.worst().slack < Time::from_ps(-50) {
                 continue;
             }

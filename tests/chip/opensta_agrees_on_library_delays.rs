@@ -8,7 +8,7 @@
 //!
 //! Chips and libraries are those of `library_chips`.
 
-use crate::library_chips::{self, Mapped};
+use crate::library_chips::{self, MappedChip};
 use crate::tool;
 
 use std::collections::BTreeMap;
@@ -58,7 +58,7 @@ fn of_every_arc_of_a_macropixel() {
     for (name, text) in &libraries {
         let (mut compared, mut slower) = (0, 0);
         for chip in library_chips::chips() {
-            let mapped = Mapped::of(text, chip);
+            let mapped = MappedChip::new(text, chip);
             let slew_ns = mapped.cells.environment.input_slew_fs / 1e6;
             mapped.opensta(&format!(
                 "set sta_preset_clear_arcs_enabled 1

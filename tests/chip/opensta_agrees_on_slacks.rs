@@ -23,7 +23,7 @@
 //! counters are clocked by data. Negative limits of D count as zero on both sides. OpenSTA takes one delay an arc, as we do (`analysis_type single`). Libraries:
 //! example.lib, osu018 and osu035.
 
-use crate::library_chips::{self, Mapped, PERIOD_NS};
+use crate::library_chips::{self, MappedChip, PERIOD_NS};
 use crate::tool;
 
 use std::collections::BTreeMap;
@@ -56,7 +56,7 @@ type Key = (&'static str, String, Launch, usize, usize);
 
 /// What a check asks and when its data come, ns.
 #[derive(Debug, Clone, Copy)]
-struct Found {
+struct CheckTimes {
     need: f64,
     arrival: f64,
     /// Half periods between launch and capture, and whether a flip-flop's data are its own.
@@ -67,9 +67,9 @@ struct Found {
 }
 
 /// The worst of each check.
-type Checks = BTreeMap<Key, Found>;
+type Checks = BTreeMap<Key, CheckTimes>;
 
-fn keep(checks: &mut Checks, key: Key, found: Found) {
+fn keep(checks: &mut Checks, key: Key, found: CheckTimes) {
     let is_late = matches!(key.0, "setup" | "recovery");
     let worst = checks.entry(key).or_insert(found);
     worst.arrival = if is_late {
@@ -78,7 +78,7 @@ fn keep(checks: &mut Checks, key: Key, found: Found) {
         worst.arrival.min(found.arrival)
     };
     if found.need > worst.need {
-        *worst = Found {
+        *worst = CheckTimes {
             arrival: worst.arrival,
             ..found
         };
@@ -156,7 +156,7 @@ fn theirs(report: &str, own_pins: &BTreeMap<String, String>) -> Checks {
         } else {
             0.0
         };
-        let found = Found {
+        let found = CheckTimes {
             need: halves as f64 * 0.5 * PERIOD_NS - slack + clamped,
             arrival: arrival - launch,
             halves,
@@ -177,19 +177,19 @@ fn theirs(report: &str, own_pins: &BTreeMap<String, String>) -> Checks {
             .filter(|line| line.contains("edge)"))
             .filter_map(|line| line.split_whitespace().nth(1)?.parse().ok())
             .collect();
-        let of = |what: &str| {
+        let block_number = |what: &str| {
             let mut lines = block.lines().filter(|line| line.contains(what));
             lines.next()?.split_whitespace().next()?.parse::<f64>().ok()
         };
         let high = block.contains("width (high)");
         let (Some(slack), Some(cell), [open, close]) =
-            (of("slack"), own_pins.get(&pin), &edges[..])
+            (block_number("slack"), own_pins.get(&pin), &edges[..])
         else {
             continue;
         };
         let ((first, from), (last, to)) = (at_edge(*open), at_edge(*close));
         let launch = [Launch::ClkRise, Launch::ClkFall][from];
-        let found = Found {
+        let found = CheckTimes {
             need: (last - first) as f64 * 0.5 * PERIOD_NS - slack,
             arrival: f64::NAN,
             halves: last - first,
@@ -207,7 +207,7 @@ fn theirs(report: &str, own_pins: &BTreeMap<String, String>) -> Checks {
 }
 
 /// Our own, by static timing with each flip-flop's own limits.
-fn ours(mapped: &Mapped) -> Checks {
+fn ours(mapped: &MappedChip) -> Checks {
     let netlist = &mapped.netlist;
     let timing = &mapped.characterised.timing;
     let nets = |names: &[&str]| -> Vec<NetId> {
@@ -230,7 +230,7 @@ fn ours(mapped: &Mapped) -> Checks {
         let (kind, edge) = (requirement.kind, requirement.edge);
         let leaf = &netlist.cells()[requirement.cell];
         let limits = timing.limits(requirement.cell, leaf.kind);
-        let limit = f64::from(limits.at(Control::Reset, kind, edge)) * 1e-6;
+        let limit = f64::from(limits.limit_fs(Control::Reset, kind, edge)) * 1e-6;
         let arrivals = all.arrivals(requirement.launch);
         let window = arrivals.edge_window(leaf.input(0), edge);
         let window = window.map(|(first, last)| {
@@ -243,7 +243,7 @@ fn ours(mapped: &Mapped) -> Checks {
         let name = kind.name();
         let launch = launches[requirement.launch as usize];
         let cell = netlist.cell_path(requirement.cell);
-        let found = Found {
+        let found = CheckTimes {
             need: ns(requirement.need) + limit,
             arrival: window.map_or(f64::NAN, ns),
             halves: requirement.halves,
@@ -293,13 +293,13 @@ fn ours(mapped: &Mapped) -> Checks {
                     let (Some((early, late)), Some((first, last))) = (clock, release) else {
                         continue;
                     };
-                    let limit = |kind| f64::from(limits.at(control, kind, Edge::Rise)) * 1e-6;
+                    let limit = |kind| f64::from(limits.limit_fs(control, kind, Edge::Rise)) * 1e-6;
                     let needs = [
                         ("recovery", ns(last - early) + limit(CheckKind::Recovery)),
                         ("removal", ns(late - first) + limit(CheckKind::Removal)),
                     ];
                     for (name, need) in needs {
-                        let found = Found {
+                        let found = CheckTimes {
                             need,
                             arrival: f64::NAN,
                             halves: 0,
@@ -320,7 +320,7 @@ fn ours(mapped: &Mapped) -> Checks {
 }
 
 /// Our flip-flop behind every input pin of its library cell.
-fn own_pins(mapped: &Mapped) -> BTreeMap<String, String> {
+fn own_pins(mapped: &MappedChip) -> BTreeMap<String, String> {
     let mut pins = BTreeMap::new();
     for (cell, leaf) in mapped.netlist.cells().iter().enumerate() {
         if leaf.kind.is_flip_flop() {
@@ -348,7 +348,7 @@ fn of_every_endpoint_of_a_macropixel() {
         // Of each check, and whether no divided clock takes part: agree; ours asks more; OpenSTA asks more.
         let mut counted: BTreeMap<(&str, bool), [usize; 3]> = BTreeMap::new();
         for chip in library_chips::chips() {
-            let mapped = Mapped::of(&text, chip);
+            let mapped = MappedChip::new(&text, chip);
             let p_counter = mapped.config.p_counter;
             let report = mapped.opensta(COMMANDS);
             assert!(!report.contains("Error"), "{name}: {report}");
@@ -381,8 +381,8 @@ fn of_every_endpoint_of_a_macropixel() {
                     assert!(*check == "hold" && (theirs.own || by_arrival), "{both}");
                     2
                 };
-                let of = (*check, theirs.is_plain);
-                counted.entry(of).or_default()[more] += 1;
+                let check_and_kind = (*check, theirs.is_plain);
+                counted.entry(check_and_kind).or_default()[more] += 1;
                 let longer = theirs.halves - ours.halves;
                 match *check {
                     "recovery" | "removal" => {}
@@ -394,8 +394,8 @@ fn of_every_endpoint_of_a_macropixel() {
         }
         println!("{name}: {counted:?}");
         let sum = |which: usize, is_plain: bool| {
-            let of = counted.iter().filter(|(key, _)| key.1 == is_plain);
-            of.map(|(_, counts)| counts[which]).sum::<usize>()
+            let entries = counted.iter().filter(|(key, _)| key.1 == is_plain);
+            entries.map(|(_, counts)| counts[which]).sum::<usize>()
         };
         let [divided, plain] =
             [false, true].map(|is_plain| [0, 1, 2].map(|which| sum(which, is_plain)));

@@ -5,7 +5,7 @@ use crate::bench;
 use crate::scenario;
 
 use bench::{Bench, SETTLING};
-use guided_dtof::chip::window_law::Window as LawWindow;
+use guided_dtof::chip::window_law::WindowOutcome as LawWindow;
 use guided_dtof::chip::{
     AfterBorrow, Exposure, PCounter, Probe, Probes, SensorConfig, Tap, WindowLaw, macropixel,
     p_counter, p_counter_timing,
@@ -76,14 +76,14 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
     let config = sensor(p_counter);
     let mut bench = counter(&config);
     let start = |load: u64| load.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 55;
-    let at = |load: u64| SETTLING * (3 + 4 * load as i64);
+    let load_time = |load: u64| SETTLING * (3 + 4 * load as i64);
     for load in 0..LOADS {
-        bench.number(at(load), "COUNTER_INIT", start(load));
-        bench.pulse(at(load) + SETTLING, SETTLING, "MEMORY_LOAD");
+        bench.number(load_time(load), "COUNTER_INIT", start(load));
+        bench.pulse(load_time(load) + SETTLING, SETTLING, "MEMORY_LOAD");
         let reset = if holds_reset {
-            (at(load), SETTLING * 3)
+            (load_time(load), SETTLING * 3)
         } else {
-            (at(load), Time::from_ns(1))
+            (load_time(load), Time::from_ns(1))
         };
         bench.pulse(reset.0, reset.1, "COUNTER_RESET");
     }
@@ -91,8 +91,8 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
     let (out, local_stop) = (probes.bus(Probe::CounterOut), bench.net("LOCAL_STOP"));
     let mut run = bench.start(&["LOCAL_STOP"]);
     let is_wrong = |&load: &u64| {
-        let model = p_counter::Model::new(&config, start(load) as u16);
-        run.number_at(at(load + 1) - Time::from_fs(1), out) != Some(model.counter_out())
+        let model = p_counter::PCounterModel::new(&config, start(load) as u16);
+        run.number_at(load_time(load + 1) - Time::from_fs(1), out) != Some(model.counter_out())
     };
     let wrong = (0..LOADS).filter(is_wrong).count();
     (wrong, run.recorder.rising_edges(local_stop).len())
@@ -366,7 +366,7 @@ fn enabling_while_clk_is_low_counts_one_step_too_many() {
         let enable = SETTLING * if enabled_low { 11 } else { 10 } + HALF;
         bench.drive(enable, "ENABLE", true);
         let falls = if enabled_low { 3 } else { 4 };
-        let probes = Probes::at(&bench.netlist, "");
+        let probes = Probes::below_instance(&bench.netlist, "");
         let out = probes.bus(Probe::CounterOut);
         let mut run = bench.start(&[]);
         let found = run.number_at(SETTLING * 18, out);

@@ -101,7 +101,7 @@ proptest! {
         bench.drive(SETTLING, "MEMORY_RESET", false);
         let mut now = SETTLING * 2;
         let mut start = 0;
-        let mut model = p_counter::Model::new(&config, start);
+        let mut model = p_counter::PCounterModel::new(&config, start);
         // When LOCAL_STOP is to rise; a reset before that keeps it low.
         let mut rises: Vec<Time> = Vec::new();
         // A load may raise it in passing.
@@ -120,7 +120,7 @@ proptest! {
                     now += SETTLING * 3;
                     bench.drive(now, "COUNTER_RESET", false);
                     now += ready;
-                    model = p_counter::Model::new(&config, start);
+                    model = p_counter::PCounterModel::new(&config, start);
                 }
                 Action::Reset => {
                     // Where the reset itself may raise LOCAL_STOP, it must have settled.
@@ -194,7 +194,7 @@ fn the_ripple_is_the_sum_of_its_stages() {
                 corner,
                 ..SensorConfig::default()
             };
-            let timing = ChipTiming::of(&config).counter;
+            let timing = ChipTiming::new(&config).counter;
             let expected = ripple + last;
             assert_eq!(timing.clk_to_local_stop, expected, "{p_counter:?} {tap:?}");
         }

@@ -20,8 +20,8 @@ use guided_dtof::logic::Logic;
 use guided_dtof::netlist::NetId;
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Selection, VcdWriter};
-use icarus::Seen;
+use guided_dtof::waves::{VcdWriter, WaveSelection};
+use icarus::IcarusChanges;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use scenario::Scenario;
@@ -149,7 +149,7 @@ proptest! {
 
     #[test]
     fn any_counts_of_any_array_leave_through_its_pins(config in arrays(), seed: u64) {
-        let order = ReadoutOrder::of(&config);
+        let order = ReadoutOrder::new(&config);
         prop_assert!(order.pins() <= config.readout_pins.min(config.cols));
         let counts = random_counts(&config, seed);
         prop_assert_eq!(&order.counts(&order.streams(&counts)), &counts);
@@ -168,7 +168,7 @@ proptest! {
         share in 0.0..1.0,
         more in 0usize..60,
     ) {
-        let order = ReadoutOrder::of(&config);
+        let order = ReadoutOrder::new(&config);
         let counts = random_counts(&config, seed);
         let mut bench = Bench::new(&readout::with_counts(order), config.corner);
         let nets = bench.bus("COUNT");
@@ -247,12 +247,12 @@ fn what_the_pins_tell_of_an_exposed_sensor_is_what_its_counters_hold() {
 
 #[test]
 fn the_readout_causes_no_event_while_nothing_is_read() {
-    struct Moved {
+    struct NetChanges {
         nets: Vec<bool>,
         from: Time,
         found: usize,
     }
-    impl Observer for Moved {
+    impl Observer for NetChanges {
         fn change(&mut self, time: Time, net: NetId, _: Logic) {
             self.found += usize::from(time > self.from && self.nets[net.index()]);
         }
@@ -276,7 +276,7 @@ fn the_readout_causes_no_event_while_nothing_is_read() {
     }
     assert!(nets.iter().filter(|&&watched| watched).count() > 100);
     let from = gate.schedule().reset_end + SETTLING;
-    let mut moved = Moved {
+    let mut moved = NetChanges {
         nets,
         from,
         found: 0,
@@ -305,13 +305,13 @@ fn icarus_reads_the_same_through_the_exported_pins() {
         let folder = tempfile::tempdir().unwrap();
         export_verilog(folder.path(), config, Some(&plan), None).unwrap();
         icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
-        let seen = Seen::by_testbench(folder.path());
+        let seen = IcarusChanges::by_testbench(folder.path());
         let pins = fs::read_to_string(folder.path().join("readout.csv")).unwrap();
         let counters = fs::read_to_string(folder.path().join("histograms.csv")).unwrap();
         assert_eq!(pins, counters, "{config:?}");
 
         gate = gate.with_readout();
-        let all = Selection::all().with_anonymous();
+        let all = WaveSelection::all().with_anonymous();
         let mut writer = VcdWriter::new(Vec::new(), gate.netlist(), &all).unwrap();
         gate.run(&mut writer);
         let end = gate.schedule().end;
@@ -367,7 +367,7 @@ fn a_reading_during_the_exposure_leaves_the_counts_as_they_are() {
         let pulses = scenario.pulses();
         let plan = StimulusPlan::new(config, exposure, 2, starts, &pulses).with_readout();
         let netlist = gate.netlist();
-        let pins = SensorPins::of(netlist);
+        let pins = SensorPins::find(netlist);
         let mut drives: Vec<Drive> = plan.stimulus(&pins).collect();
         let schedule = plan.schedule;
         let mut now = schedule.origin;

@@ -23,7 +23,7 @@ proptest! {
         let netlist = Netlist::elaborate(&load_path::with_memories(rows, cols, 9));
         prop_assert!(LoadProbe::Row.bus(&netlist).len() > 64);
         let timing = Timing::nominal(&netlist, &Library::generic_40nm(), corner);
-        let pins = LoadPins::of(&netlist);
+        let pins = LoadPins::find(&netlist);
         let all = [pins.resetb, pins.enable, pins.clk, pins.serial];
         let mut drives: Vec<Drive> = all.map(|n| Drive::new(Time::ZERO, n, false)).into();
         drives.push(Drive::new(Time::from_ns(2), pins.resetb, true));

@@ -21,7 +21,7 @@ use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::verilog::{write_cells, write_standard_cells};
-use icarus::Seen;
+use icarus::IcarusChanges;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
 
@@ -35,7 +35,7 @@ fn files(folder: &Path) -> Vec<String> {
 }
 
 /// Compares an array whose library delays come from the file that `export sdf` writes; gives what both have seen.
-fn compare(scenario: &Scenario) -> Seen {
+fn compare(scenario: &Scenario) -> IcarusChanges {
     let Scenario {
         config,
         exposure,
@@ -64,8 +64,12 @@ fn compare(scenario: &Scenario) -> Seen {
     let said = icarus::simulate(here, &icarus::standard_cells(config.corner), &["-sdf-warn"]);
     assert_eq!(said, "", "every entry finds its path");
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (rows, cols), starts, &pulses);
-    let ours = Seen::by_kernel(&mut gate, cols);
-    assert_eq!(Seen::by_testbench(here), ours, "{starts:?} {config:?}");
+    let ours = IcarusChanges::by_kernel(&mut gate, cols);
+    assert_eq!(
+        IcarusChanges::by_testbench(here),
+        ours,
+        "{starts:?} {config:?}"
+    );
     ours
 }
 
@@ -139,7 +143,8 @@ fn delays_are_written_without_elaborating_the_design() {
                 for (pin, output) in (0..cell.kind.inputs().len())
                     .flat_map(|pin| (0..cell.kind.outputs().len()).map(move |output| (pin, output)))
                 {
-                    let [read, written] = [&timing, nominal].map(|t| t.of(index)[pin][output]);
+                    let [read, written] =
+                        [&timing, nominal].map(|t| t.cell_delays(index)[pin][output]);
                     assert_eq!(read, written, "{}", netlist.cell_path(index));
                 }
             }
@@ -363,10 +368,14 @@ fn the_top_has_the_name_of_the_chip_and_a_fast_clk_is_told() {
         let small = ["--rows", "1", "--cols", "1", "--set"];
         for (clk, is_told) in [("200e6", false), ("201e6", name == "hslidar")] {
             let clk = format!("sensor.clk_hz={clk}");
-            let of = ["--sensor", sensor].into_iter().chain(small).chain([&*clk]);
-            let of: Vec<&str> = of.collect();
-            let sdf = [&["export", "sdf", "--out", "chip.sdf"], &of[..]].concat();
-            let verilog = [&["export", "verilog", "--out", "v"], &of[..]].concat();
+            let sensor_words = ["--sensor", sensor].into_iter().chain(small).chain([&*clk]);
+            let sensor_arguments: Vec<&str> = sensor_words.collect();
+            let sdf = [
+                &["export", "sdf", "--out", "chip.sdf"],
+                &sensor_arguments[..],
+            ]
+            .concat();
+            let verilog = [&["export", "verilog", "--out", "v"], &sensor_arguments[..]].concat();
             for arguments in [sdf, verilog] {
                 let exported = gdtof(here, &arguments);
                 assert!(exported.status.success(), "{exported:?}");

@@ -66,7 +66,7 @@ fn check(
             .run(&mut stimulus, now + GAP - Time::from_fs(1), &mut changes)
             .unwrap();
         for (time, net, value) in changes.seen.into_iter().filter(|_| index > 1) {
-            let edge = Edge::to(value).expect("everything is known after the reset");
+            let edge = Edge::from_final_value(value).expect("everything is known after the reset");
             let window = arrivals.edge_window(net, edge);
             let (first, last) = window.expect("a net that changes has a path to it");
             prop_assert!(

@@ -105,7 +105,7 @@ proptest! {
         let found = converter.convert("CODE", Some(period), &intervals);
         // NOT CLK rises so long after CLK falls.
         let inverter = converter.netlist.cells().iter().position(|c| c.kind == CellKind::Inv).unwrap();
-        let late = Time::from_fs(converter.timing.of(inverter)[0][0].to(Logic::One).into());
+        let late = Time::from_fs(converter.timing.cell_delays(inverter)[0][0].delay_fs(Logic::One).into());
         for (slot, (&interval, found)) in (0..).zip(intervals.iter().zip(found)) {
             let start = SLOT * slot + SETTLING * 2;
             let half = Time::from_fs(period.as_fs() / 2);
@@ -123,7 +123,7 @@ proptest! {
         intervals in intervals(),
     ) {
         let converter = Converter::new(&ring_oscillator::circuit(stages, 7), corner, seed);
-        let steps = ring_oscillator::Model::of(&converter.netlist, &converter.timing, "").steps(128);
+        let steps = ring_oscillator::RingOscillatorModel::from_netlist(&converter.netlist, &converter.timing, "").steps(128);
         let found = converter.convert("CODE", None, &intervals);
         for (&interval, found) in intervals.iter().zip(found) {
             prop_assert_eq!(found, Some(steps.code(interval) as u64), "{}", interval);

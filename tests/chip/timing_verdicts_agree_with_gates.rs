@@ -4,7 +4,7 @@
 use guided_dtof::analysis::{TimingVerdict, corner_limits, factor_range, gate_works};
 use guided_dtof::chip::race::Conflict;
 use guided_dtof::chip::{
-    AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw,
+    AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, WindowLaw, WindowOutcome,
     hslidar_delay_line,
 };
 use guided_dtof::engine::GateSimulation;
@@ -23,7 +23,7 @@ fn the_corner_at_which_384_mhz_fails_is_that_of_the_gates() {
         let range = factor_range(&config, &TYPICAL, kept).unwrap();
         assert_eq!((range.fastest, range.moved), (None, 0));
         let at = (config.clock().period(), Time::ZERO);
-        let works = |factor| gate_works(&config, &TYPICAL.at(factor), kept, at, 0);
+        let works = |factor| gate_works(&config, &TYPICAL.with_factor(factor), kept, at, 0);
         let slowest = range.slowest;
         assert!(works(slowest - 1e-5) && !works(slowest + 3e-5), "{slowest}");
     }
@@ -39,7 +39,7 @@ fn a_clock_above_the_forbidden_band_fails_with_faster_silicon_as_the_gates_do() 
     let range = factor_range(&config, &TYPICAL, Limits::Kept).unwrap();
     assert_eq!(range.moved, 1);
     let at = (config.clock().period(), Time::ZERO);
-    let works = |factor| gate_works(&config, &TYPICAL.at(factor), Limits::Kept, at, 1);
+    let works = |factor| gate_works(&config, &TYPICAL.with_factor(factor), Limits::Kept, at, 1);
     let fastest = range.fastest.unwrap();
     assert!(works(fastest + 1e-5) && !works(fastest - 3e-5), "{fastest}");
     // The correlation path limits the other end: the gates have its false edges to spare.
@@ -86,9 +86,9 @@ fn one_verdict_on_every_clock() {
         100.0, 300.0, 384.0, 406.0, 408.0, 415.0, 422.0, 425.0, 500.0, 700.0, 860.0,
     ] {
         let config = at_mhz(mhz);
-        let verdict = TimingVerdict::of(&config, &TYPICAL, (0, 0));
+        let verdict = TimingVerdict::analyse(&config, &TYPICAL, (0, 0));
         let law = WindowLaw::new(&config, &Exposure::new(&config, 80, 3));
-        let is_race = matches!(law.window(40), Window::Race(_));
+        let is_race = matches!(law.window(40), WindowOutcome::Race(_));
         assert_eq!(verdict.is_met(), !is_race, "{mhz} MHz: {verdict}");
         let found = violations(&config);
         assert_eq!(
@@ -126,7 +126,7 @@ fn one_verdict_on_every_clock() {
     let mut fails = 0;
     for mhz in (820..=862).step_by(2) {
         let config = at_mhz(f64::from(mhz));
-        let verdict = TimingVerdict::of(&config, &TYPICAL, (0, 0));
+        let verdict = TimingVerdict::analyse(&config, &TYPICAL, (0, 0));
         let found = violations(&config);
         let says = (verdict.is_met(), mhz);
         assert_eq!(says, (found.violated() == 0, mhz), "{verdict}\n{found}");
@@ -145,14 +145,14 @@ fn one_verdict_on_every_clock() {
         factor: 1.3,
         ..TYPICAL
     };
-    assert!(TimingVerdict::of(&at_mhz(300.0), &slow, (0, 0)).is_met());
-    assert!(!TimingVerdict::of(&at_mhz(384.0), &slow, (0, 0)).is_met());
+    assert!(TimingVerdict::analyse(&at_mhz(300.0), &slow, (0, 0)).is_met());
+    assert!(!TimingVerdict::analyse(&at_mhz(384.0), &slow, (0, 0)).is_met());
     // The library strobes after the change, this silicon before it: right by itself, and not where the law aims.
     let fast = Silicon {
         factor: 0.75,
         ..TYPICAL
     };
-    let verdict = TimingVerdict::of(&at_mhz(500.0), &fast, (0, 0));
+    let verdict = TimingVerdict::analyse(&at_mhz(500.0), &fast, (0, 0));
     assert!(
         !verdict.is_met() && verdict.worst().check == "strobe setup",
         "{verdict}"
@@ -182,11 +182,11 @@ fn the_verdict_is_that_of_the_window_law_in_every_mode_and_with_every_p_counter(
             ..at_mhz(mhz)
         };
         assert_eq!(config.check(), Ok(()));
-        let verdict = TimingVerdict::of(&config, &Silicon::nominal(config.corner), (0, 0));
+        let verdict = TimingVerdict::analyse(&config, &Silicon::nominal(config.corner), (0, 0));
         let exposure = Exposure::new(&config, 1 << (config.counter_bits + 1), 4);
         let start = config.largest_start() / 4;
         let window = WindowLaw::new(&config, &exposure).window(start);
-        let is_race = matches!(window, Window::Race(_));
+        let is_race = matches!(window, WindowOutcome::Race(_));
         assert_eq!(
             verdict.is_met(),
             !is_race,
@@ -203,7 +203,7 @@ fn a_verdict_notes_photons_that_cancel_and_fails_where_the_front_end_does_not_fo
         dead_time_ns: 0.12,
         ..at_mhz(300.0)
     };
-    let verdict = TimingVerdict::of(&short, &TYPICAL, (0, 0));
+    let verdict = TimingVerdict::analyse(&short, &TYPICAL, (0, 0));
     assert!(
         verdict.is_met() && verdict.worst().check == "SPAD_RAW setup",
         "{verdict}"
@@ -213,7 +213,7 @@ fn a_verdict_notes_photons_that_cancel_and_fails_where_the_front_end_does_not_fo
         factor: 1.1,
         ..TYPICAL
     };
-    let said = TimingVerdict::of(&short, &slow, (0, 0)).to_string();
+    let said = TimingVerdict::analyse(&short, &slow, (0, 0)).to_string();
     assert!(
         said.contains("dead_time_ns = 0.12 is shorter than the front end follows"),
         "{said}"
@@ -233,7 +233,7 @@ fn delay_lines_keep_their_limits_in_either_mode() {
                 mode,
                 ..(*hslidar_delay_line()).clone()
             };
-            let verdict = TimingVerdict::of(&config, &TYPICAL, (0, 0));
+            let verdict = TimingVerdict::analyse(&config, &TYPICAL, (0, 0));
             let found = violations(&config);
             assert_eq!(found.violated(), 0, "{mode:?}, {mhz} MHz: {found}");
             assert!(verdict.is_met(), "{mode:?}, {mhz} MHz: {verdict}");
@@ -245,7 +245,7 @@ fn delay_lines_keep_their_limits_in_either_mode() {
 #[test]
 fn a_verdict_fails_where_a_load_pulse_or_the_strobe_of_stop_does() {
     let names = |config: &SensorConfig, check: &str| {
-        let verdict = TimingVerdict::of(config, &TYPICAL, (0, 0));
+        let verdict = TimingVerdict::analyse(config, &TYPICAL, (0, 0));
         let margins = verdict.margins.iter();
         let slack = margins
             .filter(|margin| margin.check.contains(check))
@@ -254,7 +254,7 @@ fn a_verdict_fails_where_a_load_pulse_or_the_strobe_of_stop_does() {
     };
     let refused = |config: &SensorConfig, what: Conflict| {
         let law = WindowLaw::new(config, &Exposure::new(config, 512, 1));
-        matches!(law.window(40), Window::Race(race) if race.what == what)
+        matches!(law.window(40), WindowOutcome::Race(race) if race.what == what)
     };
     for (load_mhz, fails) in [(200.0, false), (1500.0, true)] {
         let config = SensorConfig {

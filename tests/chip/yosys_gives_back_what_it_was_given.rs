@@ -15,7 +15,8 @@ use bench::{Bench, SETTLING};
 use guided_dtof::chip::Exposure;
 use guided_dtof::chip::p_counter::{self, starts_high};
 use guided_dtof::chip::{
-    Overflow, OwnBlock, SensorConfig, Window, WindowLaw, correlation, histogram, metdc, readout,
+    Overflow, OwnBlock, SensorConfig, WindowLaw, WindowOutcome, correlation, histogram, metdc,
+    readout,
 };
 use guided_dtof::netlist::{Corner, Library, Module};
 use guided_dtof::settings::Document;
@@ -82,7 +83,7 @@ fn p_counters_open_the_same_windows() {
                 return;
             };
             let own = SensorConfig {
-                p_counter_block: Some(OwnBlock::of("block.json", module, &json)),
+                p_counter_block: Some(OwnBlock::from_module("block.json", module, &json)),
                 ..config.clone()
             };
             own.check().unwrap();
@@ -101,7 +102,7 @@ fn p_counters_open_the_same_windows() {
             for start in 0..=config.largest_start() {
                 assert_eq!(starts_high(&own, start), starts_high(&config, start));
                 let windows = laws.each_ref().map(|law| match law.window(start) {
-                    Window::Open(open) => Ok(open.first_edge),
+                    WindowOutcome::Open(open) => Ok(open.first_edge),
                     other => Err(other),
                 });
                 assert_eq!(windows[0].is_ok(), windows[1].is_ok(), "{config:?} {start}");
@@ -133,7 +134,7 @@ fn a_librarys_cells_count_as_generic_gates_do() {
         "{json}"
     );
     let read = |library: &str| {
-        let mut document = Document::of("a test", toml::Table::new());
+        let mut document = Document::from_table("a test", toml::Table::new());
         let block = folder.path().join("block.json");
         for (key, value) in [
             ("p_counter_block", block.to_str().unwrap()),

@@ -140,7 +140,7 @@ fn calibrations_of_data_sets_are_taken_as_they_come() {
     assert_eq!(taken(middlebury), ours);
     // KITTI's does not say how many disparities to search, so that some are found elsewhere.
     let others = taken(&kitti);
-    let guided = |of: &serde_json::Value| of[36]["guide_m"].as_f64().unwrap();
+    let guided = |frame_pixels: &serde_json::Value| frame_pixels[36]["guide_m"].as_f64().unwrap();
     assert!((guided(&others) - guided(&ours)).abs() < 0.1);
     std::fs::write(
         here.path().join("calib.toml"),
@@ -190,16 +190,16 @@ fn disparities_are_found_and_held_against_the_truth() {
 #[test]
 fn what_is_no_pair_is_refused_in_one_sentence() {
     let here = pair();
-    let at = |name: &str| here.path().join(name);
-    write_png(&at("small.png"), (4, 4), &[0; 16]);
+    let path = |name: &str| here.path().join(name);
+    write_png(&path("small.png"), (4, 4), &[0; 16]);
     std::fs::write(
-        at("broken.png"),
-        &std::fs::read(at("left.png")).unwrap()[..500],
+        path("broken.png"),
+        &std::fs::read(path("left.png")).unwrap()[..500],
     )
     .unwrap();
-    write_npy(&at("small.npy"), [2, 2], [1.0; 4].into_iter());
+    write_npy(&path("small.npy"), [2, 2], [1.0; 4].into_iter());
     write_npy(
-        &at("none.npy"),
+        &path("none.npy"),
         [HEIGHT, WIDTH],
         std::iter::repeat_n(f32::NAN, WIDTH * HEIGHT),
     );
@@ -211,7 +211,7 @@ fn what_is_no_pair_is_refused_in_one_sentence() {
         })
     });
     bomb.extend(checksum.to_be_bytes());
-    std::fs::write(at("bomb.png"), bomb).unwrap();
+    std::fs::write(path("bomb.png"), bomb).unwrap();
     for (name, left, more) in [
         ("singular.toml", "[[0, 0, 80], [0, 300, 60], [0, 0, 1]]", ""),
         ("skewed.toml", "[[300, 5, 80], [0, 300, 60], [0, 0, 1]]", ""),
@@ -226,7 +226,11 @@ fn what_is_no_pair_is_refused_in_one_sentence() {
             "bias = 1",
         ),
     ] {
-        std::fs::write(at(name), format!("left = {left}\nbaseline_m = 1\n{more}\n")).unwrap();
+        std::fs::write(
+            path(name),
+            format!("left = {left}\nbaseline_m = 1\n{more}\n"),
+        )
+        .unwrap();
     }
     let refused = |arguments: &[&str], says: &str| {
         let before = std::fs::read_dir(here.path()).unwrap().count();

@@ -57,7 +57,7 @@ fn replay<'a>(more: &[&'a str]) -> Vec<&'a str> {
 }
 
 /// Replaces the value of an option.
-fn with<'a>(arguments: &[&'a str], option: &str, value: &'a str) -> Vec<&'a str> {
+fn with_value<'a>(arguments: &[&'a str], option: &str, value: &'a str) -> Vec<&'a str> {
     let at = arguments.iter().position(|a| *a == option).unwrap();
     let mut changed = arguments.to_vec();
     changed[at + 1] = value;
@@ -117,42 +117,48 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
             "zero_rows.toml:2: rows = 0 is impossible",
         ),
         (
-            with(&replay(&[]), "--inits", "twice.csv"),
+            with_value(&replay(&[]), "--inits", "twice.csv"),
             "twice.csv:4: macropixel (0, 0) already has",
         ),
         (
-            with(&replay(&[]), "--inits", "big.csv"),
+            with_value(&replay(&[]), "--inits", "big.csv"),
             "big.csv:2: start value 512",
         ),
         (
-            with(&replay(&[]), "--inits", "missing.csv"),
+            with_value(&replay(&[]), "--inits", "missing.csv"),
             "missing.csv: macropixel (0, 1) has no",
         ),
         (
-            with(&replay(&[]), "--inits", "none.csv"),
+            with_value(&replay(&[]), "--inits", "none.csv"),
             "none.csv: cannot be read",
         ),
-        (with(&replay(&[]), "--inits", "."), ".: is a folder"),
+        (with_value(&replay(&[]), "--inits", "."), ".: is a folder"),
         (
-            with(&replay(&[]), "--events", "outside.csv"),
+            with_value(&replay(&[]), "--events", "outside.csv"),
             "outside.csv:2: macropixel (0, 2) is outside",
         ),
         (
-            with(&replay(&[]), "--events", "early.csv"),
+            with_value(&replay(&[]), "--events", "early.csv"),
             "early.csv:3: an event at -5 fs",
         ),
         (
-            with(&replay(&[]), "--events", "spad.csv"),
+            with_value(&replay(&[]), "--events", "spad.csv"),
             "spad.csv:2: SPAD 16",
         ),
-        (with(&replay(&[]), "--stop-periods", "1"), "--stop-periods"),
-        (with(&replay(&[]), "--laser-cycles", "0"), "--laser-cycles"),
         (
-            with(&replay(&[]), "--laser-cycles", "4000000000"),
+            with_value(&replay(&[]), "--stop-periods", "1"),
+            "--stop-periods",
+        ),
+        (
+            with_value(&replay(&[]), "--laser-cycles", "0"),
             "--laser-cycles",
         ),
         (
-            with(&replay(&[]), "--rows", "0"),
+            with_value(&replay(&[]), "--laser-cycles", "4000000000"),
+            "--laser-cycles",
+        ),
+        (
+            with_value(&replay(&[]), "--rows", "0"),
             "--rows: rows = 0 is impossible",
         ),
         (replay(&["--out", "h.txt"]), "neither .npy nor .csv"),
@@ -241,8 +247,8 @@ proptest! {
         let bytes = if as_text { text.into_bytes() } else { garbage };
         std::fs::write(folder.path().join("garbage"), bytes).unwrap();
         let arguments = match which {
-            0 => with(&replay(&[]), "--inits", "garbage"),
-            1 => with(&replay(&[]), "--events", "garbage"),
+            0 => with_value(&replay(&[]), "--inits", "garbage"),
+            1 => with_value(&replay(&[]), "--events", "garbage"),
             2 => replay(&["--sensor", "garbage"]),
             _ => vec!["frame", "--rows", "2", "--cols", "2", "--laser-cycles", "2", "--scene", "garbage"],
         };

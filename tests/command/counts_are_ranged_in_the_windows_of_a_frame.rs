@@ -6,7 +6,7 @@ use guided_dtof::files::write_npy;
 
 use super::tools::gdtof_words;
 
-fn take(folder: &Path) -> serde_json::Value {
+fn run_frame(folder: &Path) -> serde_json::Value {
     let frame = gdtof_words(
         folder,
         "frame --rows 8 --cols 8 --probe none --laser-cycles 400 --set scene.light.illuminance_klux=0 --set scene.lidar.pulse_energy_uj=1 --json",
@@ -24,7 +24,7 @@ fn write(path: &Path, shape: &[usize], counts: &[i64]) {
 fn a_frame_ranged_once_more_is_the_same_and_a_table_of_it_has_every_macropixel() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let frame = take(folder);
+    let frame = run_frame(folder);
     let range = "range --format frame --histograms out/histograms.npy";
     let again = gdtof_words(folder, &format!("{range} --json"));
     let again: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
@@ -69,7 +69,7 @@ fn no_depth_is_behind_the_lidar() {
 fn other_counts_in_the_same_windows_give_other_depths() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    take(folder);
+    run_frame(folder);
     write(&folder.join("dark.npy"), &[8, 8, 16], &[0; 1024]);
     let range = "range --format frame --frame out/frame.json --json --histograms";
     let dark = gdtof_words(folder, &format!("{range} dark.npy"));

@@ -25,7 +25,7 @@ fn a_proposed_chip_is_taken_by_frame_and_keeps_its_promise() {
         .lines()
         .find(|line| line.starts_with("balanced,"))
         .unwrap();
-    let at = |name: &str| {
+    let balanced_value = |name: &str| {
         let head = table.lines().next().unwrap().split(',');
         let column = head.clone().position(|heading| heading == name).unwrap();
         balanced
@@ -67,10 +67,10 @@ fn a_proposed_chip_is_taken_by_frame_and_keeps_its_promise() {
     let sigma_m = (square / errors_m.len() as f64).sqrt();
     // Four standard errors of 4096 macropixels.
     assert!(
-        found > at("detection") - 4.0 * (0.05 * 0.95 / 4096.0f64).sqrt(),
+        found > balanced_value("detection") - 4.0 * (0.05 * 0.95 / 4096.0f64).sqrt(),
         "{found}"
     );
-    let ratio = sigma_m / at("precision_m");
+    let ratio = sigma_m / balanced_value("precision_m");
     assert!((0.85..1.15).contains(&ratio), "{ratio}");
 }
 

@@ -29,12 +29,13 @@ fn frame(arguments: &[&str]) -> (Vec<u16>, Value) {
 
 #[test]
 fn engines_with_the_same_photons_make_the_same_histograms() {
-    let of = |engine: &[&str]| frame(&[&["--laser-cycles", "2", "--engine"], engine].concat());
-    let (gates, report) = of(&["gate"]);
+    let frame_by =
+        |engine: &[&str]| frame(&[&["--laser-cycles", "2", "--engine"], engine].concat());
+    let (gates, report) = frame_by(&["gate"]);
     assert_eq!(report["engine"], "gate");
     assert!(gates.iter().any(|&count| count > 0));
     for engine in [&["cycle"][..], &["window"], &["window", "--no-skip"]] {
-        assert_eq!(of(engine).0, gates, "{engine:?}");
+        assert_eq!(frame_by(engine).0, gates, "{engine:?}");
     }
 }
 

@@ -73,7 +73,7 @@ fn besides(command: &str, argument: &str) -> &'static str {
 }
 
 /// The words of a command with `value` for an argument, instead of what it has there.
-pub fn with(command: &str, argument: &Arg, value: &str) -> Vec<String> {
+pub fn words_with(command: &str, argument: &Arg, value: &str) -> Vec<String> {
     let id = argument.get_id().as_str();
     let mut all = words(command);
     // Its other words are not for what was taken.
@@ -99,9 +99,9 @@ pub fn with(command: &str, argument: &Arg, value: &str) -> Vec<String> {
         _ => value.to_owned(),
     };
     let place = command.split(' ').count() + argument.get_index().map_or(0, |index| index - 1);
-    let at = |words: &[String], option: &String| words.iter().position(|word| word == option);
+    let position = |words: &[String], option: &String| words.iter().position(|word| word == option);
     match option {
-        Some(option) => match at(&extra, &option) {
+        Some(option) => match position(&extra, &option) {
             Some(at) => extra[at + 1] = value,
             None => extra.extend([option, value]),
         },

@@ -112,7 +112,7 @@ fn sensors() -> Vec<SensorConfig> {
 #[test]
 fn in_the_delays_of_every_p_counter() {
     let mut found = "p_counter,tap,after_borrow,corner".to_owned();
-    for (name, _) in delays(&ChipTiming::of(&SensorConfig::default())) {
+    for (name, _) in delays(&ChipTiming::new(&SensorConfig::default())) {
         write!(found, ",{name}_fs").unwrap();
     }
     for sensor in sensors() {
@@ -126,7 +126,7 @@ fn in_the_delays_of_every_p_counter() {
         let corner = corner.name();
         let variant = format!("{p_counter:?},{tap:?},{after_borrow:?},{corner}");
         write!(found, "\n{variant}").unwrap();
-        for (_, time) in delays(&ChipTiming::of(&sensor)) {
+        for (_, time) in delays(&ChipTiming::new(&sensor)) {
             let time = time.map(|time| time.as_fs().to_string());
             write!(found, ",{}", time.unwrap_or_default()).unwrap();
         }

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use super::every_command::{commands, is_text, within, workplace};
-use super::every_path::{Role, role, with};
+use super::every_path::{Role, role, words_with};
 
 /// Far longer than a refusal takes.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -48,7 +48,7 @@ fn no_argument_of_a_command_waits_for_a_file_or_reads_it_without_end() {
                 if role == Role::Text || wants_folder && kind == "folder" {
                     continue;
                 }
-                let words = with(&command, argument, source);
+                let words = words_with(&command, argument, source);
                 let run = within(here, &words, LIMIT);
                 let error = String::from_utf8_lossy(&run.stderr).into_owned();
                 let is_refused = run.status.code() == Some(2)

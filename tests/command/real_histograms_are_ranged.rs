@@ -31,8 +31,8 @@ fn report(folder: &Path, arguments: &[&str]) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-fn rms_mm(report: &serde_json::Value, of: &str) -> f64 {
-    report[of]["rms_mm"].as_f64().unwrap()
+fn rms_mm(report: &serde_json::Value, key: &str) -> f64 {
+    report[key]["rms_mm"].as_f64().unwrap()
 }
 
 /// Captures of a plane from 0.1 m to 0.5 m by two zones with 15 mm bins, a triangular pulse four bins

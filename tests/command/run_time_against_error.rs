@@ -9,10 +9,10 @@ use guided_dtof::photon::{Convention, PhotonStream, PixelLight};
 use guided_dtof::ranging::PeakOptions;
 use guided_dtof::scene::Scene;
 use guided_dtof::system::Tolerance;
-use guided_dtof::system::pareto::{Done, Method, ParetoSettings, Point, summarise};
+use guided_dtof::system::pareto::{Done, Method, ParetoPoint, ParetoSettings, summarise};
 use guided_dtof::units::Time;
 
-fn compare(methods: &[Method]) -> Vec<Point> {
+fn compare(methods: &[Method]) -> Vec<ParetoPoint> {
     // With π times the light the cohort engine refuses the brighter wall: SPADs stay busy from one laser cycle to the next.
     let mut scene = Scene::outdoor();
     scene.lidar.convention = Convention::Thesis;

@@ -77,11 +77,11 @@ fn what_is_said_of_the_timing_is_what_frames_are_told() {
     let folder = folder("0,0,10\n", "15600000,0,0,0\n");
     let chip = "--rows 1 --cols 1 --stop-periods 60 --laser-cycles 2";
     let later = "windows end 1 bin later, as the window law has it";
-    let at = |more: &str| replay(folder.path(), &format!("{chip} {more}")).1;
-    assert!(at("--set sensor.clk_hz=450e6").contains(later));
-    assert!(!at("--set sensor.clk_hz=450e6 --quiet").contains(later));
-    assert!(!at("--set sensor.clk_hz=384e6").contains(later));
+    let report = |more: &str| replay(folder.path(), &format!("{chip} {more}")).1;
+    assert!(report("--set sensor.clk_hz=450e6").contains(later));
+    assert!(!report("--set sensor.clk_hz=450e6 --quiet").contains(later));
+    assert!(!report("--set sensor.clk_hz=384e6").contains(later));
     let lines = "--sensor hslidar_delay_line --set sensor.mode=conventional";
-    let said = at(lines);
+    let said = report(lines);
     assert!(!said.contains("timing fails"), "{said}");
 }

@@ -24,12 +24,12 @@ fn changes(path: &Path) -> Changes {
         .collect();
     waves.load_signals(&signals.iter().map(|(_, s)| *s).collect::<Vec<_>>());
     let times = waves.time_table();
-    let of = |signal| {
+    let signal_changes = |signal| {
         let changes = waves.get_signal(signal).unwrap().iter_changes();
         changes.map(|(time, value)| (times[time as usize], value.to_bit_string().unwrap()))
     };
     (signals.into_iter())
-        .map(|(name, signal)| (name, of(signal).collect()))
+        .map(|(name, signal)| (name, signal_changes(signal).collect()))
         .collect()
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::every_command::{RUNS, commands, is_text, within, workplace};
-use super::every_path::{Role, role, with};
+use super::every_path::{Role, role, words_with};
 
 /// Far longer than a refusal takes.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -153,7 +153,7 @@ fn every_file_option_names_a_file_of_another_kind() {
                     .iter()
                     .any(|(file, ids)| file == name && ids.contains(&id));
                 let before = files(here);
-                let words = with(&command, argument, name);
+                let words = words_with(&command, argument, name);
                 let run = within(here, &words, LIMIT);
                 let error = String::from_utf8_lossy(&run.stderr).into_owned();
                 let status = run.status.code();

@@ -9,9 +9,9 @@ use guided_dtof::reproduce::measured::detection::{attributions, detected};
 use guided_dtof::reproduce::measured::precision::{Estimator, by_formula, scatter};
 use guided_dtof::reproduce::measured::{Effect, Trial};
 use guided_dtof::theory::cycles::laser_cycles_for;
-use guided_dtof::theory::detection::{Model, Ties, probability};
+use guided_dtof::theory::detection::{DetectionModel, Ties, probability};
 
-const EQ_17: Model = Model::Poisson(Ties::Random);
+const EQ_17: DetectionModel = DetectionModel::Poisson(Ties::Random);
 
 /// Normal quantile that a fair seed exceeds, either way, once in a thousand.
 const RARE: f64 = 3.29;

@@ -2,11 +2,11 @@
 //! where it differs from the shift register and from delay lines; and which engines leave it out, by name.
 
 use guided_dtof::analysis::TimingVerdict;
-use guided_dtof::chip::macropixel::Model;
+use guided_dtof::chip::macropixel::MacropixelModel;
 use guided_dtof::chip::race::Irregular;
 use guided_dtof::chip::{
-    AfterBorrow, Exposure, Overflow, PCounter, Sensor, SensorConfig, Silicon, Tap, Tdc,
-    Window as LawWindow, WindowLaw, hslidar,
+    AfterBorrow, Exposure, Overflow, PCounter, Sensor, SensorConfig, Silicon, Tap, Tdc, WindowLaw,
+    WindowOutcome as LawWindow, hslidar,
 };
 use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, LitPixel, NotModelled, PulsedPixel,
@@ -142,7 +142,7 @@ proptest! {
         if config.clk_skew_ps == 0.0 || number == 0 {
             let sensor = Sensor::from(&config);
             let delays = (*sensor.timing(), &**sensor.local_stop_delays());
-            let model = Model::new(&config, delays, &exposure);
+            let model = MacropixelModel::new(&config, delays, &exposure);
             let pulses = pulses.iter().map(|pulse| (pulse.time, pulse.spad));
             prop_assert_eq!(&gate[0], &model.histogram(start, pulses)[..]);
         }
@@ -299,7 +299,7 @@ fn the_verdict_on_the_timing_knows_when_start_races() {
             clk_hz: clk_mhz * 1e6,
             ..chip(Tdc::Counter)
         };
-        let verdict = TimingVerdict::of(&config, &Silicon::of(&config), (0, 0));
+        let verdict = TimingVerdict::analyse(&config, &Silicon::new(&config), (0, 0));
         let law = WindowLaw::new(&config, &Exposure::new(&config, 60, 1));
         let opens = law.window(3).open().is_some();
         assert!(opens || !verdict.is_met(), "{clk_mhz} MHz: {verdict}");

@@ -6,8 +6,8 @@
 use crate::scenario;
 
 use crate::cases::cases;
-use guided_dtof::chip::macropixel::Model;
-use guided_dtof::chip::window_law::{Window, WindowLaw};
+use guided_dtof::chip::macropixel::MacropixelModel;
+use guided_dtof::chip::window_law::{WindowLaw, WindowOutcome};
 use guided_dtof::chip::{EventType, Exposure, Mode, PCounter, Sensor, SensorConfig};
 use guided_dtof::engine::{Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Corner;
@@ -52,7 +52,7 @@ fn compare(first_seed: u64, cases: u32, most: usize, expected: impl Fn(&Scenario
         tally.ran += 1;
         let cycle = Cycle::new(config, exposure);
         // Without the gate engine to fall back on.
-        let Ok(found) = cycle.run(starts, &cycle.pack(starts, &scenario.pulses())) else {
+        let Ok(found) = cycle.replay_packed(starts, &cycle.pack(starts, &scenario.pulses())) else {
             tally.unlevelled += 1;
             continue;
         };
@@ -80,7 +80,7 @@ fn leave_out_races(scenario: &mut Scenario) {
     let pulses = std::mem::take(&mut scenario.pulses);
     let pixels = starts.into_iter().zip(pulses);
     (scenario.starts, scenario.pulses) = pixels
-        .filter(|&(start, _)| !matches!(law.window(start), Window::Race(_)))
+        .filter(|&(start, _)| !matches!(law.window(start), WindowOutcome::Race(_)))
         .unzip();
 }
 
@@ -121,7 +121,7 @@ fn as_the_gates_of_hslidar_count() {
             leave_out_races(&mut scenario);
             let Scenario { config, starts, .. } = &scenario;
             let cycle = Cycle::new(config, &exposure);
-            let found = cycle.run(starts, &cycle.pack(starts, &scenario.pulses()));
+            let found = cycle.replay_packed(starts, &cycle.pack(starts, &scenario.pulses()));
             assert_eq!(found, Ok(gates(&scenario)), "{config:?}");
             ran += starts.len();
         }
@@ -134,7 +134,7 @@ fn as_the_reference_model_counts_in_larger_numbers() {
     let model = |scenario: &Scenario| {
         let sensor = Sensor::from(&scenario.config);
         let delays = (*sensor.timing(), &**sensor.local_stop_delays());
-        let model = Model::new(&scenario.config, delays, &scenario.exposure);
+        let model = MacropixelModel::new(&scenario.config, delays, &scenario.exposure);
         let one = |(&start, pulses): (&u16, &Vec<_>)| {
             model.histogram(
                 start,

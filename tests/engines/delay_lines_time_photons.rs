@@ -2,7 +2,7 @@
 //! its own.
 
 use guided_dtof::chip::{
-    Exposure, Mode, SensorConfig, Window as LawWindow, WindowLaw, hslidar_delay_line,
+    Exposure, Mode, SensorConfig, WindowLaw, WindowOutcome as LawWindow, hslidar_delay_line,
 };
 use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel, PulsedPixel,

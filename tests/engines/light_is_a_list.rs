@@ -208,8 +208,8 @@ fn stream(spads: SpadModel, laser_cycles: u32) -> StreamConfig {
 
 impl Piece {
     /// Mean photons of all SPADs between two times after the start of the exposure, sent by laser cycles `of`.
-    fn photons(&self, of: std::ops::Range<u32>, from_ns: f64, until_ns: f64) -> f64 {
-        let each = of.map(|cycle| {
+    fn photons(&self, laser_cycles: std::ops::Range<u32>, from_ns: f64, until_ns: f64) -> f64 {
+        let each = laser_cycles.map(|cycle| {
             let start_ns = f64::from(cycle) * CYCLE_NS;
             match *self {
                 Piece::Even {

@@ -12,7 +12,7 @@ use guided_dtof::analysis::{LocalClocks, MacropixelTiming};
 use guided_dtof::chip::own_block::Uneven;
 use guided_dtof::chip::{
     ChipTiming, Exposure, Irregular, Limits, Mode, OwnBlock, PCounter, SensorConfig, Silicon,
-    Window, WindowLaw, correlation, front_end, histogram, metdc, p_counter,
+    WindowLaw, WindowOutcome, correlation, front_end, histogram, metdc, p_counter,
 };
 use guided_dtof::engine::{self, Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Module;
@@ -29,7 +29,7 @@ fn read_back(config: &SensorConfig) -> SensorConfig {
         p_counter::circuit(config).transistors()
     );
     let own = SensorConfig {
-        p_counter_block: Some(OwnBlock::of("built_in.json", module, &json)),
+        p_counter_block: Some(OwnBlock::from_module("built_in.json", module, &json)),
         ..config.clone()
     };
     own.check().unwrap();
@@ -37,7 +37,10 @@ fn read_back(config: &SensorConfig) -> SensorConfig {
 }
 
 /// A law and what each engine that takes it counts.
-fn counted(config: &SensorConfig, scenario: &Scenario) -> (Vec<Window>, Vec<Option<Histograms>>) {
+fn counted(
+    config: &SensorConfig,
+    scenario: &Scenario,
+) -> (Vec<WindowOutcome>, Vec<Option<Histograms>>) {
     let law = WindowLaw::new(config, &scenario.exposure);
     let windows = scenario.starts.iter().map(|&start| law.window(start));
     let engines: [Box<dyn Replay>; 3] = [
@@ -61,7 +64,7 @@ fn every_built_in_counter_read_back_counts_the_same_on_every_engine() {
         let scenario = scenario::random(random, 1, lanes);
         let config = &scenario.config;
         let own = read_back(config);
-        assert_eq!(ChipTiming::of(&own), ChipTiming::of(config), "{config:?}");
+        assert_eq!(ChipTiming::new(&own), ChipTiming::new(config), "{config:?}");
         let (windows, built_in) = counted(config, &scenario);
         assert_eq!(
             counted(&own, &scenario),
@@ -105,7 +108,7 @@ fn a_counter_that_is_not_binary_gets_its_codes_and_the_law_of_the_others() {
                 .open()
         };
         if mode == Mode::Guided {
-            assert_eq!(windows[5], Window::Never);
+            assert_eq!(windows[5], WindowOutcome::Never);
             assert_eq!(
                 opens(30).unwrap().first_edge - opens(7).unwrap().first_edge,
                 23
@@ -130,7 +133,7 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
     let json = json.replace(&from, &format!(r#""D": [{}], "C""#, init[1]));
     let module = Module::from_yosys(&json, None).unwrap();
     let config = SensorConfig {
-        p_counter_block: Some(OwnBlock::of("doubled.json", module, &json)),
+        p_counter_block: Some(OwnBlock::from_module("doubled.json", module, &json)),
         cols: 8,
         rows: 1,
         ..built_in
@@ -142,7 +145,7 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
     let exposure = Exposure::new(&config, 60, 5);
     let scenario = scenario::in_exposure(&mut StdRng::seed_from_u64(1), config, exposure);
     let (windows, counted) = counted(&scenario.config, &scenario);
-    let same = Window::Irregular(Irregular::OwnCounter(Uneven::Same(0, 1)));
+    let same = WindowOutcome::Irregular(Irregular::OwnCounter(Uneven::Same(0, 1)));
     assert_eq!(windows, vec![same; 8]);
     assert_eq!(counted[0], counted[1]);
     assert!(counted[0].is_some() && counted[2].is_none());
@@ -195,7 +198,7 @@ fn with_own(
     let json = json.to_string();
     let module = Module::from_yosys(&json, None).unwrap();
     let mut config = config.clone();
-    *own(&mut config) = Some(OwnBlock::of(key, module, &json));
+    *own(&mut config) = Some(OwnBlock::from_module(key, module, &json));
     config.check().unwrap();
     config
 }
@@ -216,28 +219,28 @@ fn other_blocks_read_back_count_the_same_on_gates_and_cycles_and_have_no_law() {
         let blocks = LAWLESS.get(which..=which).unwrap_or(&LAWLESS);
         let plain = |config: SensorConfig, block: &Lawless| with_own(&config, *block, |_| ());
         let own = blocks.iter().fold(config.clone(), plain);
-        assert_eq!(ChipTiming::of(&own), ChipTiming::of(config), "{config:?}");
+        assert_eq!(ChipTiming::new(&own), ChipTiming::new(config), "{config:?}");
         let (windows, found) = counted(&own, &scenario);
         assert_eq!(
             found[..2],
             counted(config, &scenario).1[..2],
             "seed {seed}, {config:?}"
         );
-        let opens = windows.iter().any(|w| matches!(w, Window::Open(_)));
+        let opens = windows.iter().any(|w| matches!(w, WindowOutcome::Open(_)));
         assert!(!opens && found[2].is_none(), "{windows:?}");
-        let why = Window::Irregular(Irregular::OwnBlock(blocks[0].0));
+        let why = WindowOutcome::Irregular(Irregular::OwnBlock(blocks[0].0));
         ran[which] += windows.iter().filter(|window| **window == why).count();
         // What the table of `gdtof timing` asks for.
-        let silicon = Silicon::of(&own);
-        MacropixelTiming::of(&own, &silicon, Limits::Kept, (0, 0));
-        LocalClocks::of(&own, &silicon);
+        let silicon = Silicon::new(&own);
+        MacropixelTiming::analyse(&own, &silicon, Limits::Kept, (0, 0));
+        LocalClocks::analyse(&own, &silicon);
     }
     assert!(ran.iter().all(|&ran| ran > 10), "{ran:?}");
 }
 
 /// Bits that a netlist's port or a cell's pin is connected to.
-fn bits(of: &mut Value) -> &mut Vec<Value> {
-    of.as_array_mut().unwrap()
+fn bits(connection: &mut Value) -> &mut Vec<Value> {
+    connection.as_array_mut().unwrap()
 }
 
 /// Connections of all cells of a type.
@@ -305,6 +308,12 @@ fn other_blocks_that_differ_show_it_on_gates_and_cycles() {
         }
     });
     let half = found(&half);
-    let total = |of: &Histograms| of.iter().flatten().map(|&n| u32::from(n)).sum::<u32>();
+    let total = |histograms: &Histograms| {
+        histograms
+            .iter()
+            .flatten()
+            .map(|&n| u32::from(n))
+            .sum::<u32>()
+    };
     assert!(0 < total(&half) && total(&half) < total(&built_in));
 }

@@ -1,7 +1,7 @@
 //! Random P-counters of a user: legal ones count the same on every engine, those with hidden state are refused by the cell that has it.
 
 use crate::cases::cases;
-use crate::counters::{self, Drawn, Hidden, Kind};
+use crate::counters::{self, CounterKind, Hidden, RandomCounter};
 use crate::scenario;
 
 use std::collections::HashSet;
@@ -51,7 +51,7 @@ fn legal_counters_count_alike_and_hidden_state_is_refused_by_name() {
     let (mut legal, mut telling, mut lawful) = (0, 0, 0);
     for seed in 0..cases(216) {
         let random = &mut StdRng::seed_from_u64(seed.into());
-        let Drawn {
+        let RandomCounter {
             kind,
             hidden,
             config,
@@ -76,10 +76,10 @@ fn legal_counters_count_alike_and_hidden_state_is_refused_by_name() {
             (verdict, named) => panic!("{what}: {verdict:?}, {named:?}"),
         }
     }
-    let kinds: HashSet<Kind> = drawn.iter().map(|(kind, _)| *kind).collect();
+    let kinds: HashSet<CounterKind> = drawn.iter().map(|(kind, _)| *kind).collect();
     let hidden: HashSet<Hidden> = drawn.iter().map(|(_, hidden)| *hidden).collect();
     assert!(
-        kinds.len() == Kind::ALL.len() && hidden.len() == 14,
+        kinds.len() == CounterKind::ALL.len() && hidden.len() == 14,
         "{drawn:?}"
     );
     assert!(

@@ -55,7 +55,7 @@ fn silicon(random: &mut StdRng, config: &SensorConfig) -> Silicon {
             sigma,
             seed: random.random(),
         }),
-        ..Silicon::of(config)
+        ..Silicon::new(config)
     }
 }
 
@@ -72,12 +72,12 @@ fn scenario(random: &mut StdRng, clock: Clock) -> (Scenario, Silicon) {
             let mut p_counters = PCounter::ALL.to_vec();
             p_counters.retain(|&p_counter| {
                 config.p_counter = p_counter;
-                let timing = ChipTiming::of(&config);
+                let timing = ChipTiming::new(&config);
                 p_counter.row().has_memory && timing.counter.period < timing.ripple()
             });
             config.p_counter = p_counters[random.random_range(0..p_counters.len())];
         }
-        let timing = ChipTiming::of(&config);
+        let timing = ChipTiming::new(&config);
         let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;
         let edge = strobe.as_s().max(timing.clk_to_event.as_s() / 2.0) * silicon.factor;
         let half = match clock {
@@ -201,7 +201,7 @@ fn at_the_limit_the_gates_are_asked() {
             cols: 2,
             ..SensorConfig::default()
         };
-        let timing = ChipTiming::of(&config);
+        let timing = ChipTiming::new(&config);
         let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;
         config.clk_hz = 1e15 / (2 * strobe.as_fs() + 2 * off_fs) as f64;
         let mut scenario = scenario::of_sensor(random, config);

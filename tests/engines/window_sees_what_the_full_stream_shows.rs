@@ -1,7 +1,7 @@
 //! The window engine draws only what a start value can see, and counts exactly what the whole photon stream gives: the
 //! same as its own pulse-driven side, and as the cycle engine.
 
-use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
+use guided_dtof::chip::window_law::{WindowLaw, WindowOutcome as LawWindow};
 use guided_dtof::chip::{EventType, Exposure, Mode, Overflow, SensorConfig};
 use guided_dtof::engine::{
     Cycle, Expose, Histograms, LitPixel, Window, expose, expose_without_skipping, full_stream,

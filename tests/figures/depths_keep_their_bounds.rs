@@ -194,8 +194,8 @@ fn of_a_wall_in_any_light() {
             let errors = errors(&frame).into_iter();
             let of_counts = errors.filter(|(_, bound_m)| *bound_m < frame.bin_m);
             let all: Vec<(f64, f64)> = of_counts.collect();
-            let mean = |of: &dyn Fn(&(f64, f64)) -> f64| {
-                all.iter().map(of).sum::<f64>() / all.len() as f64
+            let mean = |term: &dyn Fn(&(f64, f64)) -> f64| {
+                all.iter().map(term).sum::<f64>() / all.len() as f64
             };
             let bias_m = mean(&|(off_m, _)| *off_m);
             let rms_m = mean(&|(off_m, _)| off_m * off_m).sqrt();

@@ -1,8 +1,8 @@
 //! Probability of detection against 360-digit sums (`vectors/theory/detection.py`) and against dice.
 
-use guided_dtof::photon::{Poisson, Purpose, random_stream};
+use guided_dtof::photon::{Poisson, RandomPurpose, random_stream};
 use guided_dtof::theory::cycles::laser_cycles_for;
-use guided_dtof::theory::detection::{Model, PerCycle, Ties, poisson, probability};
+use guided_dtof::theory::detection::{DetectionModel, PerCycle, Ties, poisson, probability};
 use rand_philox::Philox;
 
 /// Rows of a CSV table without its header.
@@ -45,7 +45,11 @@ fn exact_sums_agree_to_one_in_a_million_million() {
                     background,
                     bins,
                 };
-                probability(&light, row[1].parse().unwrap(), Model::Bernoulli(ties))
+                probability(
+                    &light,
+                    row[1].parse().unwrap(),
+                    DetectionModel::Bernoulli(ties),
+                )
             }
         };
         for (got, want) in [
@@ -71,8 +75,8 @@ fn gaussian_sums_agree_to_one_in_a_million_million() {
             bins: row[3].parse().unwrap(),
         };
         let model = match row[0] {
-            "meant" => Model::Gaussian,
-            _ => Model::GaussianAsPrinted,
+            "meant" => DetectionModel::Gaussian,
+            _ => DetectionModel::GaussianAsPrinted,
         };
         let got = probability(&light, 1, model).probability;
         let error = relative(got, number(row[4]));
@@ -131,15 +135,16 @@ fn the_system_of_figure_32_agrees_with_dice() {
             let n = cycles as f64;
             let signal = Poisson::new(n * (light.signal + light.background));
             let other = Poisson::new(n * light.background);
-            let mut random = random_stream(9, Purpose::Photons, bins, cycles as u32);
-            let mut more = random_stream(10, Purpose::Photons, bins, cycles as u32);
+            let mut random = random_stream(9, RandomPurpose::Photons, bins, cycles as u32);
+            let mut more = random_stream(10, RandomPurpose::Photons, bins, cycles as u32);
             let won = roll(
                 runs,
                 bins,
                 || signal.draw(&mut random),
                 || other.draw(&mut more),
             );
-            let expected = |ties| probability(&light, cycles, Model::Poisson(ties)).probability;
+            let expected =
+                |ties| probability(&light, cycles, DetectionModel::Poisson(ties)).probability;
             assert_near(
                 won,
                 runs,
@@ -165,12 +170,13 @@ fn one_hit_a_cycle_agrees_with_dice() {
             .map(|_| u32::from(u64::from(random.next_u32()) >= nothing))
             .sum()
     };
-    let mut random = random_stream(11, Purpose::Photons, 0, 0);
-    let mut more = random_stream(12, Purpose::Photons, 0, 0);
+    let mut random = random_stream(11, RandomPurpose::Photons, 0, 0);
+    let mut more = random_stream(12, RandomPurpose::Photons, 0, 0);
     let won = roll(runs, 4, || hits(&mut random, 1.2), || hits(&mut more, 0.8));
-    let expected = |ties| probability(&light, cycles, Model::Bernoulli(ties)).probability;
+    let expected = |ties| probability(&light, cycles, DetectionModel::Bernoulli(ties)).probability;
     assert_near(won, runs, expected, "one hit a cycle");
-    let every_photon = probability(&light, cycles, Model::Poisson(Ties::Random)).probability;
+    let every_photon =
+        probability(&light, cycles, DetectionModel::Poisson(Ties::Random)).probability;
     assert!(
         expected(Ties::Random) < every_photon,
         "saturation costs detections"
@@ -185,25 +191,26 @@ fn gaussian_as_meant_nears_the_exact_sum_and_as_printed_never_learns() {
         bins: 4,
     };
     let p = |cycles, model| probability(&light, cycles, model).probability;
-    let error = |n| (p(n, Model::Gaussian) - p(n, Model::Poisson(Ties::Random))).abs();
+    let error =
+        |n| (p(n, DetectionModel::Gaussian) - p(n, DetectionModel::Poisson(Ties::Random))).abs();
     assert!(
         error(1000) < 2e-3 && error(1000) < error(30),
         "{} {}",
         error(30),
         error(1000)
     );
-    let printed = [100, 10_000, 1_000_000].map(|n| p(n, Model::GaussianAsPrinted));
+    let printed = [100, 10_000, 1_000_000].map(|n| p(n, DetectionModel::GaussianAsPrinted));
     assert!(printed.iter().all(|p| *p < 0.5), "{printed:?}");
 }
 
 #[test]
 fn the_number_of_laser_cycles_is_the_smallest() {
     let models = [
-        Model::Poisson(Ties::Strict),
-        Model::Poisson(Ties::Random),
-        Model::Poisson(Ties::Loose),
-        Model::Bernoulli(Ties::Random),
-        Model::Gaussian,
+        DetectionModel::Poisson(Ties::Strict),
+        DetectionModel::Poisson(Ties::Random),
+        DetectionModel::Poisson(Ties::Loose),
+        DetectionModel::Bernoulli(Ties::Random),
+        DetectionModel::Gaussian,
     ];
     for (signal, background, bins) in [
         (0.1, 0.25, 4),
@@ -238,7 +245,7 @@ fn what_cannot_be_reached_is_said() {
         bins: 8,
     };
     assert_eq!(
-        laser_cycles_for(0.9, &light, Model::Poisson(Ties::Random)),
+        laser_cycles_for(0.9, &light, DetectionModel::Poisson(Ties::Random)),
         None
     );
     let light = PerCycle {
@@ -246,11 +253,11 @@ fn what_cannot_be_reached_is_said() {
         ..light
     };
     assert_eq!(
-        laser_cycles_for(1.0, &light, Model::Poisson(Ties::Random)),
+        laser_cycles_for(1.0, &light, DetectionModel::Poisson(Ties::Random)),
         None
     );
     assert_eq!(
-        laser_cycles_for(0.997, &light, Model::GaussianAsPrinted),
+        laser_cycles_for(0.997, &light, DetectionModel::GaussianAsPrinted),
         None
     );
 }

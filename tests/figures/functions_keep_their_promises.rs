@@ -9,7 +9,7 @@ use guided_dtof::engine::cohort::{BlindSpad, at_least_hit, none_of};
 use guided_dtof::photon::{DeadTimeLaw, NormalSampler, Poisson, pulse_share};
 use guided_dtof::ranging::{PeakOptions, interpolate};
 use guided_dtof::report::Grid;
-use guided_dtof::theory::detection::{self, Detection, Model, PerCycle, Ties};
+use guided_dtof::theory::detection::{self, Detection, DetectionModel, PerCycle, Ties};
 use guided_dtof::theory::precision::{cramer_rao, thompson};
 use guided_dtof::units::{Frequency, Time};
 
@@ -230,8 +230,8 @@ fn whole() -> Vec<Function> {
                     bins: a[3] as u32,
                 };
                 let model = match a[0] {
-                    0.0 => Model::Gaussian,
-                    _ => Model::GaussianAsPrinted,
+                    0.0 => DetectionModel::Gaussian,
+                    _ => DetectionModel::GaussianAsPrinted,
                 };
                 Value::Real(detection::probability(&light, 1, model).probability)
             },
@@ -266,8 +266,8 @@ fn detection(a: &[f64]) -> Detection {
         bins: a[4] as u32,
     };
     let (model, cycles) = match a[0] {
-        0.0 => (Model::Poisson(ties), 1),
-        _ => (Model::Bernoulli(ties), a[1] as u64),
+        0.0 => (DetectionModel::Poisson(ties), 1),
+        _ => (DetectionModel::Bernoulli(ties), a[1] as u64),
     };
     detection::probability(&light, cycles, model)
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use guided_dtof::reproduce::{
-    Report, Row, Selection, Verdict, html, markdown, overall, reproduce, tally,
+    ClaimRow, Report, Selection, Verdict, html, markdown, overall, reproduce, tally,
 };
 
 use super::command::gdtof;
@@ -32,7 +32,7 @@ fn no_claim_leaves_its_tolerance() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-fn rows_of(number: u32) -> &'static [Row] {
+fn rows_of(number: u32) -> &'static [ClaimRow] {
     let mut claims = claims().claims.iter();
     let claim = claims.find(|result| result.claim.number == number);
     &claim.expect("every claim is computed").rows
@@ -145,7 +145,7 @@ fn references_of_our_own_are_not_called_published() {
     let bounds = rows_of(10)
         .iter()
         .filter(|row| row.what.starts_with("bound at"));
-    let verdicts: Vec<Verdict> = bounds.map(Row::verdict).collect();
+    let verdicts: Vec<Verdict> = bounds.map(ClaimRow::verdict).collect();
     assert_eq!(verdicts, [Verdict::Ours; 3]);
 }
 
@@ -224,7 +224,7 @@ fn verdicts_are_the_known_ones() {
             .to_owned()
     };
     let lines = claims().claims.iter().flat_map(|result| {
-        let line = move |row: &Row| {
+        let line = move |row: &ClaimRow| {
             format!(
                 "{} | {} | {}",
                 result.claim.number,

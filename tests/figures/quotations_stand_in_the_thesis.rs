@@ -7,7 +7,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use guided_dtof::reproduce::{ClaimResult, Report, Row, between_quotes};
+use guided_dtof::reproduce::{ClaimResult, ClaimRow, Report, between_quotes};
 
 use super::published_figures_are_met::claims;
 
@@ -82,7 +82,7 @@ fn quoted_in_claims(report: &Report) -> Vec<(String, String)> {
     let results = report.claims.iter();
     let of_claim = |result: &ClaimResult| {
         let place = format!("claim {}", result.claim.number);
-        let words = result.rows.iter().flat_map(Row::quoted);
+        let words = result.rows.iter().flat_map(ClaimRow::quoted);
         let quoted = words.map(move |words| (place.clone(), words.to_owned()));
         quoted.collect::<Vec<_>>()
     };

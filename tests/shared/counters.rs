@@ -17,7 +17,7 @@ use crate::yosys;
 
 /// What counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum CounterKind {
     /// Binary, up, with a comparator.
     Up,
     /// One flip-flop for each state, and a decoder of the memory.
@@ -32,14 +32,14 @@ pub enum Kind {
     Memoryless,
 }
 
-impl Kind {
-    pub const ALL: [Kind; 6] = [
-        Kind::Up,
-        Kind::Ring,
-        Kind::Johnson,
-        Kind::Load,
-        Kind::Feedback,
-        Kind::Memoryless,
+impl CounterKind {
+    pub const ALL: [CounterKind; 6] = [
+        CounterKind::Up,
+        CounterKind::Ring,
+        CounterKind::Johnson,
+        CounterKind::Load,
+        CounterKind::Feedback,
+        CounterKind::Memoryless,
     ];
 }
 
@@ -99,8 +99,8 @@ impl Hidden {
 
 /// A counter.
 #[derive(Debug)]
-pub struct Drawn {
-    pub kind: Kind,
+pub struct RandomCounter {
+    pub kind: CounterKind,
     pub hidden: Hidden,
     /// The sensor with it, not checked.
     pub config: SensorConfig,
@@ -109,17 +109,19 @@ pub struct Drawn {
 }
 
 /// Number `which` of all kinds with all that they might hide; `random` decides the rest.
-pub fn drawn(which: usize, random: &mut StdRng) -> Drawn {
-    let of = |kind: Kind| match kind {
-        Kind::Memoryless => &Hidden::WITHOUT[..],
+pub fn drawn(which: usize, random: &mut StdRng) -> RandomCounter {
+    let hidden_states = |kind: CounterKind| match kind {
+        CounterKind::Memoryless => &Hidden::WITHOUT[..],
         _ => &Hidden::WITH_MEMORY[..],
     };
-    let all = Kind::ALL
-        .into_iter()
-        .flat_map(|kind| of(kind).iter().map(move |&hidden| (kind, hidden)));
-    let all: Vec<(Kind, Hidden)> = all.collect();
+    let all = CounterKind::ALL.into_iter().flat_map(|kind| {
+        hidden_states(kind)
+            .iter()
+            .map(move |&hidden| (kind, hidden))
+    });
+    let all: Vec<(CounterKind, Hidden)> = all.collect();
     let (kind, hidden) = all[which % all.len()];
-    let has_memory = kind != Kind::Memoryless;
+    let has_memory = kind != CounterKind::Memoryless;
     let wraps = !has_memory || random.random_bool(0.3);
     let after_borrow = if wraps {
         AfterBorrow::Wrap
@@ -142,11 +144,11 @@ pub fn drawn(which: usize, random: &mut StdRng) -> Drawn {
     let (module, named) = Circuit::new(config.counter_bits, random).build(kind, hidden, wraps);
     let json = yosys::json(&module);
     let module = Module::from_yosys(&json, None).unwrap();
-    Drawn {
+    RandomCounter {
         kind,
         hidden,
         config: SensorConfig {
-            p_counter_block: Some(OwnBlock::of("random.json", module, &json)),
+            p_counter_block: Some(OwnBlock::from_module("random.json", module, &json)),
             ..config
         },
         named,
@@ -367,25 +369,25 @@ impl<'r> Circuit<'r> {
     }
 
     /// HIT, and what resets the count.
-    fn counter(&mut self, kind: Kind, hidden: Hidden) -> (Net, Net) {
+    fn counter(&mut self, kind: CounterKind, hidden: Hidden) -> (Net, Net) {
         let bits = self.init.len();
-        if kind == Kind::Memoryless {
+        if kind == CounterKind::Memoryless {
             return self.memoryless(hidden);
         }
         let memory = self.memory(hidden);
         self.hidden = hidden;
         let reset = match kind {
-            Kind::Load => self.reset,
+            CounterKind::Load => self.reset,
             _ => self.count_reset(),
         };
         let hit = match kind {
-            Kind::Up => {
+            CounterKind::Up => {
                 let q = self.m.wire_bus("COUNT", bits);
                 let next = self.next(&q, true);
                 self.count(reset, (&q, &next), 0);
                 self.equal(&q, &memory)
             }
-            Kind::Feedback => {
+            CounterKind::Feedback => {
                 let q = self.m.wire_bus("COUNT", bits);
                 let taps = [[2, 1], [3, 2], [4, 2]][bits - 3];
                 let first = self.gate(Xnor2, &taps.map(|tap| q[tap]));
@@ -396,7 +398,7 @@ impl<'r> Circuit<'r> {
                 self.count(reset, (&q, &next), 0);
                 self.equal(&q, &memory)
             }
-            Kind::Ring => {
+            CounterKind::Ring => {
                 let states = 1 << bits;
                 let q = self.m.wire_bus("COUNT", states);
                 let next: Vec<Net> = (0..states)
@@ -410,7 +412,7 @@ impl<'r> Circuit<'r> {
                 let hits: Vec<Net> = hits.collect();
                 self.m.tree(Or2, &hits)
             }
-            Kind::Johnson => {
+            CounterKind::Johnson => {
                 let half = 1 << (bits - 1);
                 let q = self.m.wire_bus("COUNT", half);
                 let last = self.gate(Inv, &q[half - 1..]);
@@ -437,7 +439,7 @@ impl<'r> Circuit<'r> {
                 let hits: Vec<Net> = hits.collect();
                 self.m.tree(Or2, &hits)
             }
-            Kind::Load => {
+            CounterKind::Load => {
                 let q = self.m.wire_bus("COUNT", bits);
                 let next = self.next(&q, false);
                 for bit in 0..bits {
@@ -455,7 +457,7 @@ impl<'r> Circuit<'r> {
                 }
                 self.is(&q, 0)
             }
-            Kind::Memoryless => unreachable!("it has been built"),
+            CounterKind::Memoryless => unreachable!("it has been built"),
         };
         (hit, reset)
     }
@@ -511,7 +513,7 @@ impl<'r> Circuit<'r> {
 
     fn build(
         mut self,
-        kind: Kind,
+        kind: CounterKind,
         hidden: Hidden,
         wraps: bool,
     ) -> (Arc<Module>, Option<&'static str>) {
@@ -539,7 +541,9 @@ impl<'r> Circuit<'r> {
             Cycles => {
                 let width = self.random.random_range(1..8);
                 let clock = match self.random.random_range(0..2) {
-                    0 if kind != Kind::Memoryless => self.gate(Or2, &[self.reset, self.load]),
+                    0 if kind != CounterKind::Memoryless => {
+                        self.gate(Or2, &[self.reset, self.load])
+                    }
                     _ => self.local_stop,
                 };
                 let count = self.ripple(width, clock, self.memory_reset);

@@ -14,7 +14,7 @@ use guided_dtof::settings::Document;
 /// The QuantIC4x4 with the counter of the book's chapter.
 pub fn lfsr() -> SensorConfig {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/blocks/lfsr_p_counter.json");
-    let mut document = Document::of("a test", toml::Table::new());
+    let mut document = Document::from_table("a test", toml::Table::new());
     let file = file.to_str().unwrap().into();
     document.set_value("p_counter_block", file, "the option");
     SensorConfig::read_document(&document).unwrap()

@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pulse = [(0, true), (1, false)];
     let pulse = pulse.map(|(ns, level)| Drive::new(Time::from_ns(ns), reset, level));
     let ticks = clock(clk, Frequency::from_hz(500_000_000), Time::ZERO, 0, 201);
-    let mut stimulus = Stimulus::new(pulse).with(ticks);
+    let mut stimulus = Stimulus::new(pulse).with_drives(ticks);
 
     // The kernel runs in pieces; between them it can be asked anything.
     let q = netlist.signal("Q").expect("a port");

@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for corner in Corner::ALL {
         let timing = Timing::nominal(&netlist, &library, corner);
         let analysis = StaticTiming::new(&netlist, &timing);
-        let asked = Requirements::of(&netlist, &analysis, clk, &[], &library, corner)?;
+        let asked = Requirements::new(&netlist, &analysis, clk, &[], &library, corner)?;
         let setups = asked.all().iter().filter(|r| r.kind == CheckKind::Setup);
         let least = setups.min_by_key(|r| r.slack(period));
         let least = least.expect("there are flip-flops");

@@ -12,7 +12,7 @@ use femtogate::Origin;
 use femtogate::kernel::{Drive, Kernel, Stimulus, clock};
 use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
 use femtogate::units::{Frequency, Time};
-use femtogate::waves::{Entry, FstWriter, Group, Layout, Selection, VcdWriter};
+use femtogate::waves::{Entry, FstWriter, Layout, SignalGroup, VcdWriter, WaveSelection};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).map(PathBuf::from);
@@ -43,11 +43,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     let drives = drives.map(|(ns, net, level)| Drive::new(Time::from_ns(ns), net, level));
     let ticks = clock(clk, Frequency::from_hz(1_000_000_000), Time::ZERO, 0, 40);
-    let mut stimulus = Stimulus::new(drives).with(ticks);
+    let mut stimulus = Stimulus::new(drives).with_drives(ticks);
 
     // Two observers of one simulation.
     let (vcd, fst) = (folder.join("register.vcd"), folder.join("register.fst"));
-    let selection = Selection::all();
+    let selection = WaveSelection::all();
     let mut to_vcd = VcdWriter::new(File::create(&vcd)?, &netlist, &selection)?;
     let fst_file = File::options()
         .read(true)
@@ -64,8 +64,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let layout = Layout {
         groups: vec![
-            Group::new("inputs", ["CLK", "RESET", "D"].map(Entry::binary)),
-            Group::new("register", [Entry::hex("Q")]),
+            SignalGroup::new("inputs", ["CLK", "RESET", "D"].map(Entry::binary)),
+            SignalGroup::new("register", [Entry::hex("Q")]),
         ],
         zoom: (Time::ZERO, end),
         marker: Some(Time::from_ns(4)),

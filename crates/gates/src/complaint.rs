@@ -95,9 +95,9 @@ fn in_room(message: &str) -> String {
 }
 
 /// Text in one line: a terminal does nothing but show it.
-struct Escaped<'t>(&'t str);
+struct EscapedText<'t>(&'t str);
 
-impl fmt::Display for Escaped<'_> {
+impl fmt::Display for EscapedText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.chars().try_for_each(|c| {
             if c.is_control() {
@@ -111,11 +111,11 @@ impl fmt::Display for Escaped<'_> {
 
 impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", Escaped(&self.source_name))?;
+        write!(f, "{}", EscapedText(&self.source_name))?;
         if let Some(line) = self.line {
             write!(f, ":{line}")?;
         }
-        write!(f, ": {}", Escaped(&in_room(&self.message)))?;
+        write!(f, ": {}", EscapedText(&in_room(&self.message)))?;
         self.further.iter().try_for_each(|e| write!(f, "\n{e}"))
     }
 }
@@ -132,7 +132,7 @@ impl InputError {
     }
 
     /// A complaint about one line (counted from 1) of `source`.
-    pub fn at(source: impl fmt::Display, line: usize, message: impl Into<String>) -> Self {
+    pub fn at_line(source: impl fmt::Display, line: usize, message: impl Into<String>) -> Self {
         InputError {
             line: Some(line),
             ..Self::new(source, message)

@@ -16,7 +16,7 @@ use guided_dtof_sensor::units::{Time, TimeOfFlight};
 const PIXELS: u32 = 256;
 const RUNS: usize = 5;
 
-struct Kind {
+struct LightKind {
     name: &'static str,
     config: SensorConfig,
     /// Standard deviation of the pulse, ps.
@@ -28,8 +28,8 @@ struct Kind {
     is_double: bool,
 }
 
-fn kinds() -> Vec<Kind> {
-    let kind = |name, signal, background_hz| Kind {
+fn kinds() -> Vec<LightKind> {
+    let kind = |name, signal, background_hz| LightKind {
         name,
         config: SensorConfig::default(),
         sigma_ps: 1_911,
@@ -37,7 +37,7 @@ fn kinds() -> Vec<Kind> {
         background_hz,
         is_double: false,
     };
-    let with = |name, config, signal, background_hz| Kind {
+    let with = |name, config, signal, background_hz| LightKind {
         config,
         ..kind(name, signal, background_hz)
     };
@@ -58,7 +58,7 @@ fn kinds() -> Vec<Kind> {
         crosstalk_probability: 0.01,
         ..SensorConfig::default()
     };
-    let short = |name, sigma_ps, signal, background_hz| Kind {
+    let short = |name, sigma_ps, signal, background_hz| LightKind {
         sigma_ps,
         ..kind(name, signal, background_hz)
     };
@@ -67,7 +67,7 @@ fn kinds() -> Vec<Kind> {
         kind("0.1 to 3 photons, in the dark", [0.1, 3.0], 0.0),
         kind("3 to 100 photons", [3.0, 100.0], 8e6),
         kind("1000 to 10 000 photons", [1e3, 1e4], 8e6),
-        Kind {
+        LightKind {
             is_double: true,
             ..kind("0.5 to 10 photons, two surfaces", [0.5, 10.0], 8e6)
         },
@@ -120,7 +120,7 @@ fn kinds() -> Vec<Kind> {
 }
 
 /// Histograms of the macropixels, and what finds their echoes.
-fn exposed(kind: &Kind) -> (EchoFinder, Vec<Vec<u32>>) {
+fn exposed(kind: &LightKind) -> (EchoFinder, Vec<Vec<u32>>) {
     let config = SensorConfig {
         rows: 16,
         cols: 16,
@@ -187,13 +187,13 @@ fn main() {
             writeln!(places, "{};{number};{place:?}", kind.name).expect("text");
         }
         times.sort_by(f64::total_cmp);
-        let at = |share: f64| times[(share * (times.len() - 1) as f64) as usize];
+        let quantile = |share: f64| times[(share * (times.len() - 1) as f64) as usize];
         println!(
             "{:42} {:8.1} {:8.1} {:8.1}  {bounded}",
             kind.name,
-            at(0.5),
-            at(0.99),
-            at(1.0)
+            quantile(0.5),
+            quantile(0.99),
+            quantile(1.0)
         );
     }
     if let Some(file) = file {

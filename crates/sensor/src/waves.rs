@@ -26,7 +26,7 @@ pub enum WaveFormat {
 
 impl WaveFormat {
     /// What the name of a file asks for: FST if it ends so, else VCD.
-    pub fn of(path: &Path) -> Self {
+    pub fn from_path(path: &Path) -> Self {
         match path.extension() {
             Some(extension) if extension.eq_ignore_ascii_case("fst") => WaveFormat::Fst,
             _ => WaveFormat::Vcd,
@@ -62,7 +62,7 @@ impl WaveFile {
         path: &Path,
         format: WaveFormat,
         netlist: &Netlist,
-        selection: &Selection,
+        selection: &WaveSelection,
         span: RangeInclusive<Time>,
     ) -> Result<Self, InputError> {
         let failed = |e| InputError::unwritable(path, &e);

@@ -47,7 +47,7 @@ pub(super) struct PairArgs {
 }
 
 /// The pair in place of a scene.
-pub(super) struct Taken {
+pub(super) struct MatchedPairScene {
     pub(super) scene: Scene,
     pub(super) guide: Arc<dyn Guide>,
     pub(super) report: PairReport,
@@ -80,12 +80,12 @@ impl PairArgs {
     ///
     /// # Errors
     /// Files that cannot be read or do not make a pair; a calibration that is impossible or gives no depth.
-    pub(super) fn take(
+    pub(super) fn match_pair(
         &self,
         sensor: &SensorConfig,
         optics: Scene,
         out: &Path,
-    ) -> Result<Option<Taken>, InputError> {
+    ) -> Result<Option<MatchedPairScene>, InputError> {
         let (Some(left_path), Some(right_path), Some(calib_path)) =
             (&self.left, &self.right, &self.calib)
         else {
@@ -155,7 +155,7 @@ impl PairArgs {
         let shape = Shape::Map {
             centre_m: -from_camera_m,
             yaw_deg: 0.0,
-            map: Arc::new(DepthMap::of(files, raster)?),
+            map: Arc::new(DepthMap::from_depths(files, raster)?),
         };
         let mut scene = optics;
         scene.objects = vec![Object::new("pair", 1.0, shape)];
@@ -181,9 +181,9 @@ impl PairArgs {
                 None => "the pair's own depths",
             },
             matched: map.matched(),
-            disparity_errors: truth.map(|truth| Errors::of(&map, &truth)),
+            disparity_errors: truth.map(|truth| Errors::new(&map, &truth)),
         };
-        Ok(Some(Taken {
+        Ok(Some(MatchedPairScene {
             scene,
             guide: Arc::new(guide),
             report,
@@ -194,7 +194,7 @@ impl PairArgs {
     }
 }
 
-impl Taken {
+impl MatchedPairScene {
     /// Writes depths that light comes from, and disparities that guide.
     ///
     /// # Errors

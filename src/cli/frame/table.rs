@@ -8,7 +8,7 @@ use crate::files::MANIFEST;
 use crate::report::Table;
 use crate::request::{eye_safety_of, frame_s, variance_left_out_of};
 use crate::scene::EyeSafety;
-use crate::system::{Frame, FrameSettings, NoDepth, Summary};
+use crate::system::{Frame, FrameSettings, FrameSummary, NoDepth};
 use crate::units::Time;
 
 /// What matters first.
@@ -19,24 +19,24 @@ pub(super) fn brief(
     frame: &Frame,
 ) -> Table {
     let summary = frame.summary();
-    let of = |part: usize, whole: usize| format!("{part} of {whole}");
+    let part_of_whole = |part: usize, whole: usize| format!("{part} of {whole}");
     let with_surface = summary.depths - summary.depths_without_surface;
     let mut table = Table::new(format!("Frame of {}", scene_name(args)))
         .row(
             "macropixels that see a surface",
-            of(summary.with_target, summary.pixels),
+            part_of_whole(summary.with_target, summary.pixels),
         )
         .row(
             "windows that hold their surface",
-            of(summary.in_window, summary.guided),
+            part_of_whole(summary.in_window, summary.guided),
         )
         .row(
             "surfaces with a depth",
-            of(with_surface, summary.with_target),
+            part_of_whole(with_surface, summary.with_target),
         )
         .row(
             format!("depths off by more than a bin ({:.2} m)", summary.bin_m),
-            of(summary.outliers, with_surface),
+            part_of_whole(summary.outliers, with_surface),
         );
     if let Some(error_m) = summary.median_absolute_error_m {
         table.push("median error of these depths", format!("{error_m:.3} m"));
@@ -56,7 +56,7 @@ pub(super) fn brief(
             frame.exposure_time
         ),
     );
-    table.push("laser", judged(settings, frame));
+    table.push("laser", eye_safety_text(settings, frame));
     table.push("timing of the chip", timing_of(settings, timing));
     probes(&mut table, args, frame);
     table.push("run time", format!("{:.2} s", frame.times.total_s()));
@@ -65,7 +65,7 @@ pub(super) fn brief(
 }
 
 /// Surfaces without a depth by reason, the commonest first.
-fn without_a_depth(summary: &Summary) -> Option<String> {
+fn without_a_depth(summary: &FrameSummary) -> Option<String> {
     let reasons = summary.no_depth.iter();
     let mut reasons: Vec<_> = reasons
         .filter(|(reason, _)| **reason != NoDepth::NoSurface)
@@ -108,7 +108,7 @@ fn files(table: &mut Table, args: &FrameArgs, frame: &Frame) {
 }
 
 /// How far the laser is from the limit of class 1.
-fn judged(settings: &FrameSettings, frame: &Frame) -> String {
+fn eye_safety_text(settings: &FrameSettings, frame: &Frame) -> String {
     match safety(settings, frame) {
         None => "not judged at this wavelength".to_owned(),
         Some(EyeSafety { times_class_1, .. }) if times_class_1 > 1.0 => {
@@ -134,13 +134,13 @@ pub(super) fn push_details(
     frame: &Frame,
 ) {
     let summary = frame.summary();
-    let of = |part: usize, whole: usize| format!("{part} of {whole}");
+    let part_of_whole = |part: usize, whole: usize| format!("{part} of {whole}");
     table.push(
         match settings.sensor.mode {
             Mode::Guided => "guided",
             Mode::Conventional => "with the one window of the conventional mode",
         },
-        of(summary.guided, summary.pixels),
+        part_of_whole(summary.guided, summary.pixels),
     );
     if !args.exposure.guiding.guides.is_empty() {
         table.push("guide", settings.guide.name());
@@ -164,7 +164,7 @@ pub(super) fn push_details(
     let skipped = work.skipped_dark + work.skipped_closed;
     table.push(
         "simulated: macropixels",
-        of((work.macropixels - skipped) as usize, summary.pixels),
+        part_of_whole((work.macropixels - skipped) as usize, summary.pixels),
     );
     if let Some(kept) = &frame.kept {
         table.push(

@@ -8,10 +8,10 @@ use serde::Serialize;
 
 use super::args::RangeArgs;
 use super::crosstalk;
-use super::detector::{described_detector, description, within};
-use super::returns::{shown, write_further, write_further_head};
-use crate::cli::voice::{note, say_json, tell};
-use crate::files::{HistogramFormat, Histograms, InputError, OutputFile, ZoneCounts};
+use super::detector::{check_within, described_detector, description};
+use super::returns::{number_text, write_further, write_further_head};
+use crate::cli::voice::{note, say_json, say_unless_quiet};
+use crate::files::{HistogramFormat, InputError, OutputFile, ZoneCounts, ZoneHistograms};
 use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
@@ -48,11 +48,11 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         ..default
     };
     if let Some(per_unit) = args.counts_per_unit {
-        within("--counts-per-unit", per_unit, (1e-9, 1e9))?;
+        check_within("--counts-per-unit", per_unit, (1e-9, 1e9))?;
     }
     let kept = args.bins.as_deref().map(bins).transpose()?;
     let described = description(args)?;
-    let mut histograms = Histograms::read(&args.histograms, format, args.counts_per_unit)?;
+    let mut histograms = ZoneHistograms::read(&args.histograms, format, args.counts_per_unit)?;
     let whole = described_detector(args, &described, histograms.bins)?;
     let kept = kept.unwrap_or(0..histograms.bins);
     if kept.end > histograms.bins {
@@ -113,11 +113,11 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         let row = format!("{lit} of {}", glass.len());
         table.push("zones with light of a cover glass", row);
     }
-    Ok(tell(table)?)
+    Ok(say_unless_quiet(table)?)
 }
 
 /// Zones whose histogram is that of the zone before them.
-fn repeated(histograms: &Histograms) -> usize {
+fn repeated(histograms: &ZoneHistograms) -> usize {
     let of_capture = |capture: &ZoneCounts| {
         let zones: Vec<&[u32]> = capture.counts.chunks_exact(histograms.bins).collect();
         let is_repeated = |pair: &&[&[u32]]| {
@@ -252,13 +252,13 @@ fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
                 "{},{},{},{},{},{},{},{},{}",
                 zone.capture,
                 zone.zone,
-                shown(first.map(|of| of.depth_m)),
-                shown(first.and_then(|of| of.bound_m)),
-                shown(first.and_then(|of| of.spread_m)),
-                shown(first.map(|of| of.photons)),
-                shown(first.map(|of| of.confidence)),
+                number_text(first.map(|of| of.depth_m)),
+                number_text(first.and_then(|of| of.bound_m)),
+                number_text(first.and_then(|of| of.spread_m)),
+                number_text(first.map(|of| of.photons)),
+                number_text(first.map(|of| of.confidence)),
                 zone.no_depth.map_or(String::new(), |why| why.to_string()),
-                shown(zone.sensor_m),
+                number_text(zone.sensor_m),
             )?;
             let returns = &zone.returns;
             write_further(out, |n| {

@@ -6,7 +6,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::args::RangeArgs;
-use crate::files::{HistogramFormat, Histograms, InputError};
+use crate::files::{HistogramFormat, InputError, ZoneHistograms};
 use crate::ranging::Detector;
 
 /// Photons of the glass in each bin of each zone and capture; no bins in a zone without any.
@@ -16,7 +16,7 @@ use crate::ranging::Detector;
 pub(super) fn light(
     args: &RangeArgs,
     (source, format): (&Path, HistogramFormat),
-    (histograms, kept): (&Histograms, Range<usize>),
+    (histograms, kept): (&ZoneHistograms, Range<usize>),
     detectors: &[Detector],
 ) -> Result<Vec<Vec<f64>>, InputError> {
     // The pulse leaves at nearly the same time in all captures.
@@ -29,7 +29,7 @@ pub(super) fn light(
     let measured = if is_fit {
         None
     } else {
-        let mut measured = Histograms::read(source, format, args.counts_per_unit)?;
+        let mut measured = ZoneHistograms::read(source, format, args.counts_per_unit)?;
         let (zones, bins) = (histograms.zones(), histograms.bins);
         let is_alike = measured.zones() == zones && measured.bins >= kept.end;
         if is_alike {

@@ -2,7 +2,7 @@
 
 use super::args::{Counts, RangeArgs};
 use crate::files::{InputError, parse_toml, read_text};
-use crate::ranging::{BadDetector, Counted, Detector, DetectorDescription};
+use crate::ranging::{BadDetector, CountedEvents, Detector, DetectorDescription};
 
 /// A detector, and whether its description says when bins begin.
 pub(super) struct DescribedDetector {
@@ -23,8 +23,8 @@ pub(super) fn description(args: &RangeArgs) -> Result<DetectorDescription, Input
         described.bin_edges_ns = None;
     }
     let counts = args.counts.map(|counts| match counts {
-        Counts::Every => Counted::Every,
-        Counts::First => Counted::First,
+        Counts::Every => CountedEvents::Every,
+        Counts::First => CountedEvents::First,
     });
     described.bin_width_ns = args.bin_width_ns.or(described.bin_width_ns);
     described.start_ns = args.start_ns.or(described.start_ns);
@@ -69,7 +69,7 @@ pub(super) fn described_detector(
 ///
 /// # Errors
 /// That it is not.
-pub(super) fn within(
+pub(super) fn check_within(
     option: &str,
     value: f64,
     (least, most): (f64, f64),

@@ -5,19 +5,19 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::RangeArgs;
-use super::returns::{shown, write_further, write_further_head};
+use super::returns::{number_text, write_further, write_further_head};
 use crate::cli::quality;
-use crate::cli::voice::{say_json, tell};
+use crate::cli::voice::{say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate, read_calibration};
-use crate::system::{PixelDepth, Ranged, Summary, TakenFrame, check_counts};
+use crate::system::{ArrayDepths, FrameSummary, PixelDepth, TakenFrame, check_counts};
 
 /// What is printed with `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
-    summary: Summary,
+    summary: FrameSummary,
     bin_m: f64,
     macropixels: &'a [PixelDepth],
 }
@@ -49,8 +49,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     };
     let shape = [sensor.rows, sensor.cols, sensor.bins];
     let counts = read_counts(&args.histograms, &shape)?;
-    let of = (sensor, &taken.settings.exposure);
-    check_counts(args.histograms.display(), of, &counts)?;
+    let chip = (sensor, &taken.settings.exposure);
+    check_counts(args.histograms.display(), chip, &counts)?;
     let ranged = taken.range(&counts, &options, calibration.as_ref())?;
     if let Some(path) = &args.out {
         write_csv(path, sensor.cols, &ranged)?;
@@ -65,10 +65,10 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     }
     let mut table = Table::new(format!("Depths of {}", args.histograms.display()));
     quality::rows(&mut table, &options, &ranged.summary());
-    Ok(tell(table)?)
+    Ok(say_unless_quiet(table)?)
 }
 
-fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
+fn write_csv(path: &Path, cols: usize, ranged: &ArrayDepths) -> anyhow::Result<()> {
     OutputFile::write_with(path, |out| {
         write!(
             out,
@@ -83,13 +83,13 @@ fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
                 at / cols,
                 at % cols,
                 pixel.start.map_or(String::new(), |s| s.to_string()),
-                shown(pixel.true_m),
-                shown(pixel.guide_m),
-                shown(pixel.measured_m),
-                shown(pixel.bound_m),
-                shown(pixel.spread_m),
-                shown(pixel.returns.get(0).map(|first| first.photons)),
-                shown(pixel.confidence),
+                number_text(pixel.true_m),
+                number_text(pixel.guide_m),
+                number_text(pixel.measured_m),
+                number_text(pixel.bound_m),
+                number_text(pixel.spread_m),
+                number_text(pixel.returns.get(0).map(|first| first.photons)),
+                number_text(pixel.confidence),
                 pixel.no_depth.map_or("", |why| why.name()),
             )?;
             write_further(out, |n| {

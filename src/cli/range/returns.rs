@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use crate::system::RETURNS;
 
 /// A number, or nothing.
-pub(super) fn shown(value: Option<f64>) -> String {
+pub(super) fn number_text(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| format!("{value:.6}"))
 }
 
@@ -27,9 +27,9 @@ pub(super) fn write_further(
         write!(
             out,
             ",{},{},{}",
-            shown(further.map(|(depth_m, ..)| depth_m)),
-            shown(further.and_then(|(_, bound_m, _)| bound_m)),
-            shown(further.map(|(.., photons)| photons)),
+            number_text(further.map(|(depth_m, ..)| depth_m)),
+            number_text(further.and_then(|(_, bound_m, _)| bound_m)),
+            number_text(further.map(|(.., photons)| photons)),
         )?;
     }
     Ok(())

@@ -6,11 +6,11 @@
 use serde::Serialize;
 
 use super::args::{Fit, RangeArgs};
-use super::returns::shown;
-use crate::cli::voice::{say_json, tell};
+use super::returns::number_text;
+use crate::cli::voice::{say_json, say_unless_quiet};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
-use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
+use crate::ranging::{ArrivalOptions, Calibration, ZoneEcho, arrival};
 use crate::report::Grid;
 use crate::system::median;
 
@@ -20,7 +20,7 @@ const LEAST_SIGNAL: f64 = 100.0;
 /// One zone of one capture that sees the plane.
 struct Sighting {
     capture: usize,
-    echo: Echo,
+    echo: ZoneEcho,
     true_m: Option<f64>,
     sensor_m: Option<f64>,
 }
@@ -85,7 +85,7 @@ fn sightings(captures: &[Capture]) -> (Vec<Sighting>, LeftOut) {
             };
             found.push(Sighting {
                 capture: index,
-                echo: Echo {
+                echo: ZoneEcho {
                     zone,
                     arrival_bins: pulse.position_bins - reference.position_bins,
                     signal_counts: pulse.signal_counts,
@@ -117,9 +117,13 @@ fn fitted_on(captures: &[Capture], fit: Fit) -> Vec<bool> {
     fitted
 }
 
-fn calibrate(args: &RangeArgs, zones: usize, of: &[&Sighting]) -> Result<Calibration, InputError> {
-    let known = of.iter().filter_map(|s| Some((s.echo, s.true_m?)));
-    let known: Vec<(Echo, f64)> = known.collect();
+fn calibrate(
+    args: &RangeArgs,
+    zones: usize,
+    sightings: &[&Sighting],
+) -> Result<Calibration, InputError> {
+    let known = sightings.iter().filter_map(|s| Some((s.echo, s.true_m?)));
+    let known: Vec<(ZoneEcho, f64)> = known.collect();
     Calibration::fit(zones, &known).map_err(|error| {
         let message = format!("{error}; calibrate on other or more captures (--fit)");
         InputError::new(args.histograms.display(), message)
@@ -149,7 +153,7 @@ struct Errors {
 
 impl Errors {
     /// `None` without any.
-    fn of(errors_m: impl Iterator<Item = f64>) -> Option<Self> {
+    fn new(errors_m: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut n, mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0, 0f64);
         for error in errors_m {
             n += 1.0;
@@ -235,18 +239,18 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         None => {
             // Counts left out: the sensor has had them, and says nothing of a walk that is left.
             let own = |s: &Sighting| {
-                let echo = Echo {
+                let echo = ZoneEcho {
                     zone: s.echo.zone,
                     arrival_bins: s.sensor_m?,
                     signal_counts: 0.0,
                 };
                 Some((echo, s.true_m?))
             };
-            let known: Vec<(Echo, f64)> = fitted.iter().filter_map(|s| own(s)).collect();
+            let known: Vec<(ZoneEcho, f64)> = fitted.iter().filter_map(|s| own(s)).collect();
             let line = Calibration::fit(zones, &known).ok();
             line.and_then(|line| {
                 let known = reported.iter().filter_map(|s| own(s));
-                Errors::of(known.map(|(echo, true_m)| line.depth_m(&echo) - true_m))
+                Errors::new(known.map(|(echo, true_m)| line.depth_m(&echo) - true_m))
             })
         }
     };
@@ -263,8 +267,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
             writeln!(out, "capture,zone,true_m,depth_m,sensor_m")?;
             for s in &reported {
                 let (capture, zone) = (captures[s.capture].capture, s.echo.zone);
-                let (true_m, depth_m) = (shown(s.true_m), depth(s));
-                let sensor_m = shown(s.sensor_m);
+                let (true_m, depth_m) = (number_text(s.true_m), depth(s));
+                let sensor_m = number_text(s.sensor_m);
                 writeln!(out, "{capture},{zone},{true_m},{depth_m:.6},{sensor_m}")?;
             }
             Ok(())
@@ -279,8 +283,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         reported: reported.len(),
         fit: args.calibration.is_none().then_some(fit),
         median_m: median(reported.iter().map(|s| depth(s))).unwrap_or(f64::NAN),
-        depths: Errors::of(reported.iter().filter_map(|s| Some(depth(s) - s.true_m?))),
-        sensor: Errors::of(
+        depths: Errors::new(reported.iter().filter_map(|s| Some(depth(s) - s.true_m?))),
+        sensor: Errors::new(
             reported
                 .iter()
                 .filter_map(|s| Some(s.sensor_m? - s.true_m?)),
@@ -291,7 +295,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     if args.json {
         return say_json(&report);
     }
-    tell(table(&report))?;
+    say_unless_quiet(table(&report))?;
     Ok(())
 }
 

@@ -17,7 +17,7 @@ pub(super) enum Format {
 
 impl Format {
     /// That of a file's name.
-    pub(super) fn of(path: &Path) -> Result<Self, InputError> {
+    pub(super) fn from_path(path: &Path) -> Result<Self, InputError> {
         match path.extension().and_then(|e| e.to_str()) {
             Some("npy") => Ok(Format::Npy),
             Some("csv") => Ok(Format::Csv),

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use super::section::{Cell, Section};
+use super::section::{Section, SectionCell};
 use crate::analysis::{Spread, spread};
 use crate::chip::{SensorConfig, Silicon};
 use crate::cli::voice::progress;
@@ -30,8 +30,8 @@ pub(super) fn table(config: &SensorConfig, found: &Spread) -> Section {
         config.clk_hz * 1e-6
     );
     let mut section = Section::new("spread", title, &["", "value"]);
-    let ps = |seconds: f64| Cell::Number(Some(seconds * 1e12), 3);
-    let count = |number: usize| Cell::Number(Some(number as f64), 0);
+    let ps = |seconds: f64| SectionCell::Number(Some(seconds * 1e12), 3);
+    let count = |number: usize| SectionCell::Number(Some(number as f64), 0);
     let (slowest, tightest) = (found.slowest(), found.tightest());
     let fails = |works: fn(&crate::analysis::PixelTiming) -> bool| {
         count(found.pixels.iter().filter(|p| !works(p)).count())

@@ -1,6 +1,6 @@
 //! `gdtof timing --explain`: what the cells of a library are used for, and which were passed over.
 
-use super::section::{Cell, Section};
+use super::section::{Section, SectionCell};
 use crate::chip::Silicon;
 use crate::files::InputError;
 use crate::netlist::CellKind;
@@ -41,7 +41,7 @@ pub(super) fn cells(silicon: &Silicon) -> Result<[Section; 2], InputError> {
     let columns = &["cell", "file", "line", "why"];
     let mut passed_over = Section::new("passed_over", title, columns);
     for cell in &liberty.passed_over {
-        let line = Cell::Number(Some(cell.line as f64), 0);
+        let line = SectionCell::Number(Some(cell.line as f64), 0);
         let [name, file, why] =
             [&cell.cell, &cell.file, &cell.why].map(|text| text.as_str().into());
         passed_over.push([name, file, line, why]);

@@ -10,11 +10,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use self::section::{Cell, Section};
+use self::section::{Section, SectionCell};
 use self::tables::Subject;
 use super::SensorArgs;
 use super::settings::SiliconArgs;
-use super::voice::{busy, say_json, tell};
+use super::voice::{busy, say_json, say_unless_quiet};
 use crate::analysis::{HighestClock, LoadTiming, ReadTiming, TimingVerdict, highest_clock};
 use crate::chip::{Limits, SensorConfig, Silicon, Tdc};
 use crate::files::InputError;
@@ -79,15 +79,15 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     }
     let busy = busy("analysing");
     let subject = Subject::new(&config, &silicon);
-    let load = LoadTiming::of(&config, &silicon, Limits::Kept);
-    let read = ReadTiming::of(&config, &silicon, Limits::Kept);
+    let load = LoadTiming::analyse(&config, &silicon, Limits::Kept);
+    let read = ReadTiming::analyse(&config, &silicon, Limits::Kept);
     let mismatched = silicon.mismatch.is_some();
     let spread = mismatched.then(|| distribution::analyse(&config, &silicon));
     let position = spread.as_ref().map_or((0, 0), |spread| {
         let tightest = spread.tightest();
         (tightest.row, tightest.col)
     });
-    let verdict = TimingVerdict::of(&config, &silicon, position);
+    let verdict = TimingVerdict::analyse(&config, &silicon, position);
     let highest = highest_clock(&config, &silicon, position);
     let mut sections = vec![
         condition_table(&args.silicon, &config, &silicon),
@@ -125,9 +125,9 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
         }
         say_json(&document)?;
     } else {
-        tell(answer(&config, &verdict, highest.as_ref()))?;
+        say_unless_quiet(answer(&config, &verdict, highest.as_ref()))?;
         for section in &sections {
-            tell(section.text())?;
+            say_unless_quiet(section.text())?;
         }
     }
     Ok(())
@@ -187,9 +187,9 @@ fn condition_table(args: &SiliconArgs, config: &SensorConfig, silicon: &Silicon)
     section.push([
         silicon.corner.name().into(),
         process.into(),
-        Cell::Number(voltage_v, 3),
-        Cell::Number(temperature_c, 1),
-        Cell::Number(Some(silicon.factor), 4),
+        SectionCell::Number(voltage_v, 3),
+        SectionCell::Number(temperature_c, 1),
+        SectionCell::Number(Some(silicon.factor), 4),
     ]);
     section
 }

@@ -6,7 +6,7 @@ use crate::report::Grid;
 use crate::units::Time;
 
 /// One value of a table.
-pub(super) enum Cell {
+pub(super) enum SectionCell {
     /// A name.
     Text(String),
     /// A time; in JSON, picoseconds.
@@ -15,12 +15,12 @@ pub(super) enum Cell {
     Number(Option<f64>, usize),
 }
 
-impl Cell {
+impl SectionCell {
     fn text(&self) -> String {
         match self {
-            Cell::Text(text) => text.clone(),
-            Cell::Time(time) => time.map_or("-".to_owned(), |t| t.to_string()),
-            Cell::Number(number, decimals) => {
+            SectionCell::Text(text) => text.clone(),
+            SectionCell::Time(time) => time.map_or("-".to_owned(), |t| t.to_string()),
+            SectionCell::Number(number, decimals) => {
                 number.map_or("-".to_owned(), |n| format!("{n:.decimals$}"))
             }
         }
@@ -28,34 +28,34 @@ impl Cell {
 
     fn json(&self) -> Value {
         match self {
-            Cell::Text(text) => json!(text),
-            Cell::Time(time) => json!(time.map(|t| t.as_fs() as f64 * 1e-3)),
-            Cell::Number(number, _) => json!(number),
+            SectionCell::Text(text) => json!(text),
+            SectionCell::Time(time) => json!(time.map(|t| t.as_fs() as f64 * 1e-3)),
+            SectionCell::Number(number, _) => json!(number),
         }
     }
 }
 
-impl From<&str> for Cell {
+impl From<&str> for SectionCell {
     fn from(text: &str) -> Self {
-        Cell::Text(text.to_owned())
+        SectionCell::Text(text.to_owned())
     }
 }
 
-impl From<String> for Cell {
+impl From<String> for SectionCell {
     fn from(text: String) -> Self {
-        Cell::Text(text)
+        SectionCell::Text(text)
     }
 }
 
-impl From<Time> for Cell {
+impl From<Time> for SectionCell {
     fn from(time: Time) -> Self {
-        Cell::Time(Some(time))
+        SectionCell::Time(Some(time))
     }
 }
 
-impl From<Option<Time>> for Cell {
+impl From<Option<Time>> for SectionCell {
     fn from(time: Option<Time>) -> Self {
-        Cell::Time(time)
+        SectionCell::Time(time)
     }
 }
 
@@ -64,7 +64,7 @@ pub(super) struct Section {
     key: &'static str,
     title: String,
     headings: &'static [&'static str],
-    rows: Vec<Vec<Cell>>,
+    rows: Vec<Vec<SectionCell>>,
 }
 
 impl Section {
@@ -83,8 +83,8 @@ impl Section {
     }
 
     /// Adds a row, which must have a cell for every heading.
-    pub(super) fn push(&mut self, cells: impl IntoIterator<Item = Cell>) {
-        let row: Vec<Cell> = cells.into_iter().collect();
+    pub(super) fn push(&mut self, cells: impl IntoIterator<Item = SectionCell>) {
+        let row: Vec<SectionCell> = cells.into_iter().collect();
         debug_assert_eq!(row.len(), self.headings.len());
         self.rows.push(row);
     }
@@ -93,16 +93,16 @@ impl Section {
     pub(super) fn text(&self) -> String {
         let mut grid = Grid::new(self.headings.iter().copied());
         for row in &self.rows {
-            grid.push(row.iter().map(Cell::text));
+            grid.push(row.iter().map(SectionCell::text));
         }
         format!("{}\n{grid}\n", self.title)
     }
 
     /// Adds the table to a document: a list of objects.
     pub(super) fn add_to(&self, document: &mut Map<String, Value>) {
-        let object = |row: &Vec<Cell>| -> Value {
+        let object = |row: &Vec<SectionCell>| -> Value {
             let keys = self.headings.iter().map(|h| h.replace([' ', '-'], "_"));
-            keys.zip(row.iter().map(Cell::json))
+            keys.zip(row.iter().map(SectionCell::json))
                 .collect::<Map<_, _>>()
                 .into()
         };

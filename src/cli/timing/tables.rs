@@ -1,6 +1,6 @@
 //! The tables of `gdtof timing`, one function each.
 
-use super::section::{Cell, Section};
+use super::section::{Section, SectionCell};
 use crate::analysis::{
     CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, ReadTiming, TimingVerdict,
     corner_limits, factor_range, gate_works, load_works, longest, phases, read_works, reset,
@@ -23,7 +23,7 @@ pub(super) struct Subject<'a> {
 
 impl<'a> Subject<'a> {
     pub(super) fn new(config: &'a SensorConfig, silicon: &'a Silicon) -> Self {
-        let pixel = |limits| MacropixelTiming::of(config, silicon, limits, (0, 0));
+        let pixel = |limits| MacropixelTiming::analyse(config, silicon, limits, (0, 0));
         Subject {
             config,
             silicon,
@@ -32,7 +32,7 @@ impl<'a> Subject<'a> {
         }
     }
 
-    fn of(&self, limits: Limits) -> &MacropixelTiming {
+    fn timing(&self, limits: Limits) -> &MacropixelTiming {
         match limits {
             Limits::Kept => &self.kept,
             Limits::Ignored => &self.ignored,
@@ -135,9 +135,9 @@ pub(super) fn periods(subject: &Subject<'_>) -> Section {
         (Limits::Ignored, "what is captured"),
         (Limits::Kept, "setup, hold, widths"),
     ] {
-        let pixel = subject.of(limits);
+        let pixel = subject.timing(limits);
         let gates = |period, phase| gate_works(config, silicon, limits, (period, phase), 0);
-        let correlation = CorrelationTiming::of(config, silicon, limits);
+        let correlation = CorrelationTiming::simulate(config, silicon, limits);
         push(
             &format!("STOP on CLK's fall: {suffix}"),
             shortest_period(SLOW, |p| pixel.works(p, Time::ZERO)),
@@ -175,7 +175,7 @@ pub(super) fn forbidden(subject: &Subject<'_>) -> Section {
 /// How fast start values can be loaded.
 pub(super) fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let (config, silicon) = (subject.config, subject.silicon);
-    let ignored = LoadTiming::of(config, silicon, Limits::Ignored).period();
+    let ignored = LoadTiming::analyse(config, silicon, Limits::Ignored).period();
     let names = ["load_clk", "Shortest LOAD_CLK period", "what is loaded"];
     serial_clk(names, [ignored, load.period()], |limits| {
         load_works(config, silicon, limits)
@@ -185,7 +185,7 @@ pub(super) fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
 /// How fast histograms can be read.
 pub(super) fn read_clk(subject: &Subject<'_>, read: &ReadTiming) -> Section {
     let (config, silicon) = (subject.config, subject.silicon);
-    let ignored = ReadTiming::of(config, silicon, Limits::Ignored).period();
+    let ignored = ReadTiming::analyse(config, silicon, Limits::Ignored).period();
     let names = ["read_clk", "Shortest READ_CLK period", "what is read"];
     serial_clk(names, [ignored, read.period()], |limits| {
         read_works(config, silicon, limits)
@@ -213,8 +213,8 @@ fn serial_clk<W: Fn(Time) -> bool>(
 /// Headings of [`period_row`].
 const PERIODS: &[&str] = &["limited by", "static", "event-driven", "static (MHz)"];
 
-fn period_row(name: &str, paths: Option<Time>, gates: Option<Time>) -> [Cell; 4] {
-    let mhz = Cell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
+fn period_row(name: &str, paths: Option<Time>, gates: Option<Time>) -> [SectionCell; 4] {
+    let mhz = SectionCell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
     [name.into(), paths.into(), gates.into(), mhz]
 }
 
@@ -232,7 +232,7 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming, read: &ReadTi
     let title =
         "Tightest flip-flops; slack at the configured CLK, LOAD_CLK, READ_CLK and dead time";
     let mut section = Section::new("flip_flops", title, headings);
-    let local = LocalClocks::of(config, subject.silicon);
+    let local = LocalClocks::analyse(config, subject.silicon);
     let pixel = &subject.kept;
     let period = config.clock().period();
     let phase = config.stop_phase();
@@ -299,7 +299,7 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
     } else {
         "a code for each start value"
     };
-    let number = |n: u64| Cell::Number(Some(n as f64), 0);
+    let number = |n: u64| SectionCell::Number(Some(n as f64), 0);
     let title = format!("P-counter: {}", block.file().display());
     let headings = &["what", "this one", "built-in"];
     let mut section = Section::new("p_counter", title, headings);
@@ -309,7 +309,7 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
         number(built_in.transistors()),
     ]);
     let area = |config: &SensorConfig, circuit: &Module| match library_area(config) {
-        Some(um2) => Cell::Number(Some(um2), 1),
+        Some(um2) => SectionCell::Number(Some(um2), 1),
         None => number(circuit.area()),
     };
     section.push([
@@ -333,7 +333,7 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
 
 /// What areas are in: a library's square micrometres, or transistors that are packed as in the custom flip-flop.
 fn area_heading(config: &SensorConfig) -> &'static str {
-    match CellLibrary::of(config)
+    match CellLibrary::from_config(config)
         .ok()
         .and_then(CellLibrary::from_file)
     {
@@ -344,7 +344,7 @@ fn area_heading(config: &SensorConfig) -> &'static str {
 
 /// Area of the P-counter in a macropixel, um2, in the cells of the sensor's library, as `gdtof power` has it; `None` without one.
 fn library_area(config: &SensorConfig) -> Option<f64> {
-    let library = CellLibrary::of(config).ok()?.from_file()?;
+    let library = CellLibrary::from_config(config).ok()?.from_file()?;
     let netlist = Netlist::elaborate(&macropixel::circuit(config));
     let scope = netlist.scope("p_counter")?;
     let placed = library.characterised(&netlist);
@@ -408,7 +408,7 @@ pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
         Some(range) => {
             let at = (config.clock().period(), config.stop_phase());
             let works = |factor: f64| {
-                let silicon = silicon.at(factor);
+                let silicon = silicon.with_factor(factor);
                 gate_works(config, &silicon, Limits::Kept, at, range.moved)
             };
             let gates = |works_at: f64, fails_at: f64| match (works(works_at), works(fails_at)) {
@@ -438,10 +438,10 @@ pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
         section.push([
             limit.process.name().into(),
             verdict.into(),
-            Cell::Number(limit.fails_below_v, 3),
-            Cell::Number(limit.fails_above_c, 1),
-            Cell::Number(limit.fails_above_v, 3),
-            Cell::Number(limit.fails_below_c, 1),
+            SectionCell::Number(limit.fails_below_v, 3),
+            SectionCell::Number(limit.fails_above_c, 1),
+            SectionCell::Number(limit.fails_above_v, 3),
+            SectionCell::Number(limit.fails_below_c, 1),
         ]);
     }
     section

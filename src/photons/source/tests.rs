@@ -1,3 +1,5 @@
+//! Photons of a light source: the same on any number of threads, at the rates that its facts state, within the memory allowed.
+
 use super::*;
 use crate::photon::SpadModel;
 

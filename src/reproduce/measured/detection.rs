@@ -1,7 +1,7 @@
 //! Eq. 17 against the chip: how often the fullest bin is the echo's.
 
 use super::trial::{Effect, Trial};
-use super::{Study, interval_text};
+use super::{MeasuredStudy, interval_text};
 use crate::chip::Overflow;
 use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, share};
@@ -9,12 +9,12 @@ use crate::report::{Chart, Grid};
 use crate::reproduce::parameters::sigma_over_fwhm;
 use crate::reproduce::thesis::measurement;
 use crate::theory::cycles::laser_cycles_for;
-use crate::theory::detection::{Model, PerCycle, Ties, probability};
+use crate::theory::detection::{DetectionModel, PerCycle, Ties, probability};
 
 /// Eq. 17 with every photon counted, ties by lot.
-const EQ_17: Model = Model::Poisson(Ties::Random);
+const EQ_17: DetectionModel = DetectionModel::Poisson(Ties::Random);
 /// The same with one hit per bin and cycle.
-const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
+const ONE_HIT: DetectionModel = DetectionModel::Bernoulli(Ties::Random);
 
 /// Background of the thesis's Table 6, counts/s.
 const DAYLIGHT_HZ: f64 = 20e6;
@@ -25,11 +25,11 @@ const DAYLIGHT_HZ: f64 = 20e6;
 /// Configurations that no engine can run.
 pub fn detected(trial: &Trial, frames: usize, seed: u64) -> Result<Estimate, EngineError> {
     let histograms = trial.histograms(trial.affordable(frames), seed, |_| 0.0)?;
-    Ok(judged(trial, &histograms, trial.ties_by_lot))
+    Ok(detection_share(trial, &histograms, trial.ties_by_lot))
 }
 
 /// P_D in some histograms. By lot, a tie of k bins is found one time in k.
-pub(super) fn judged(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Estimate {
+pub(super) fn detection_share(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Estimate {
     let echo = trial.echo_bins.round() as usize;
     let won = |counts: &Vec<u32>| {
         let most = counts.iter().max().expect("a bin");
@@ -45,7 +45,7 @@ pub(super) fn judged(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Es
     share(histograms.iter().map(won).sum(), histograms.len() as f64)
 }
 
-fn by_formula(light: &PerCycle, cycles: u32, model: Model) -> f64 {
+fn by_formula(light: &PerCycle, cycles: u32, model: DetectionModel) -> f64 {
     probability(light, cycles.into(), model).probability
 }
 
@@ -112,7 +112,7 @@ fn cases() -> Vec<(&'static str, Trial)> {
     let case = |signal, times_daylight: f64| Trial::new(signal, times_daylight * DAYLIGHT_HZ, 0);
     let long = |overflow, cycles| Trial {
         cycles,
-        ..case(0.3, 15.0).on(|sensor| sensor.overflow = overflow)
+        ..case(0.3, 15.0).with_sensor_change(|sensor| sensor.overflow = overflow)
     };
     let cases = vec![
         ("daylight, a narrow echo", case(0.05, 1.0)),
@@ -128,15 +128,15 @@ fn cases() -> Vec<(&'static str, Trial)> {
         ("60 x daylight", case(1.0, 60.0)),
         (
             "15 x daylight, paralysable SPADs of 8 ns",
-            case(0.3, 15.0).on(|sensor| sensor.paralysable = true),
+            case(0.3, 15.0).with_sensor_change(|sensor| sensor.paralysable = true),
         ),
         (
             "daylight, 2 SPADs at a time",
-            case(0.05, 1.0).on(|sensor| sensor.threshold = 1),
+            case(0.05, 1.0).with_sensor_change(|sensor| sensor.threshold = 1),
         ),
         (
             "60 x daylight, 5 SPADs at a time",
-            case(1.0, 60.0).on(|sensor| sensor.threshold = 4),
+            case(1.0, 60.0).with_sensor_change(|sensor| sensor.threshold = 4),
         ),
         (
             "15 x daylight, 40 000 cycles, saturating",
@@ -205,23 +205,23 @@ pub fn attributions(frames: usize) -> Result<Vec<Attribution>, EngineError> {
         let seed = 100 + number as u64;
         let histograms = trial.histograms(trial.affordable(frames), seed, |_| 0.0)?;
         let mut without = [None; 6];
-        let is_long = trial.without(Effect::Overflow).is_some();
+        let is_long = trial.without_effect(Effect::Overflow).is_some();
         for (effect, without) in Effect::ALL.into_iter().zip(&mut without) {
             let is_slow = is_long && matches!(effect, Effect::DeadTime | Effect::OneHit);
             if is_slow {
                 continue;
             } else if effect == Effect::Ties {
-                *without = Some(judged(&trial, &histograms, true));
-            } else if let Some(trial) = trial.without(effect) {
+                *without = Some(detection_share(&trial, &histograms, true));
+            } else if let Some(trial) = trial.without_effect(effect) {
                 *without = Some(detected(&trial, frames, seed)?);
             }
         }
         let control = trial.in_thin_light();
-        let control = control.without(Effect::Spread).unwrap_or(control);
+        let control = control.without_effect(Effect::Spread).unwrap_or(control);
         Ok(Attribution {
             name,
             formula: by_formula(&trial.per_cycle(), trial.cycles, EQ_17),
-            chip: judged(&trial, &histograms, false),
+            chip: detection_share(&trial, &histograms, false),
             without,
             control: detected(&control, frames, seed)?,
             trial,
@@ -265,7 +265,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let (sweep, chart) = sweep(frames)?;
     let grids = [sweep, failures(frames)?];
     Ok(measurement(1).study(&[("frames", frames)], grids, Some(chart)))

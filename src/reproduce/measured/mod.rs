@@ -23,7 +23,7 @@ pub const FRAMES: usize = 300;
 
 /// What a study found.
 #[derive(Debug, Clone, Default)]
-pub struct Study {
+pub struct MeasuredStudy {
     /// How it was done.
     pub notes: Vec<String>,
     /// Tables, each with its title.

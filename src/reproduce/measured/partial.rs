@@ -19,7 +19,7 @@ use std::sync::OnceLock;
 
 use self::delay_line::OnDelayLines;
 use self::steps::{Detection, FEWEST, Measurement, detecting, measuring};
-use super::Study;
+use super::MeasuredStudy;
 use super::interval_text;
 use super::penalty::{ratio, sum};
 use crate::chip::{Sensor, SensorConfig, hslidar};
@@ -94,7 +94,7 @@ pub(crate) struct OnChip {
 
 impl OnChip {
     /// What was measured at a range.
-    pub(crate) fn at(&self, range_m: f64) -> &AtRange {
+    pub(crate) fn result(&self, range_m: f64) -> &AtRange {
         let at = self.ranges.iter().find(|at| at.range_m == range_m);
         at.expect("a range that is measured")
     }
@@ -222,7 +222,7 @@ fn detections(all: &[OnChip]) -> Grid {
                 format!("{:.0}", detection.reckoned),
                 with_interval(&detection.found, 3),
                 detection.frames.to_string(),
-                shown(detection.cycles, 0),
+                estimate_text(detection.cycles, 0),
             ];
             cells.extend(detection.exposures.map(|n| n.to_string()));
             cells.extend(
@@ -261,11 +261,11 @@ fn schemes(all: &[OnChip], lines: &OnDelayLines) -> Grid {
                 grid.push([
                     format!("{}, {} m, {scheme}", on_chip.name, at.range_m),
                     format!("{reckoned:.0}"),
-                    shown(cycles, 0),
+                    estimate_text(cycles, 0),
                     format!("{:.2}", reckoned / full),
                     match scheme {
                         "guided" => "1".to_owned(),
-                        _ => shown(penalty, 2),
+                        _ => estimate_text(penalty, 2),
                     },
                     match scheme {
                         "guided" => with_interval(&at.measurement.found, 3),
@@ -305,7 +305,7 @@ fn each(all: &[OnChip]) -> impl Iterator<Item = (&'static str, &AtRange)> {
     all.iter().flat_map(ranges)
 }
 
-fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
+fn estimate_text(estimate: Option<Estimate>, decimals: usize) -> String {
     estimate.map_or("never".to_owned(), |e| with_interval(&e, decimals))
 }
 
@@ -313,7 +313,7 @@ fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let all = measure_both(frames)?;
     let lines = measure_on_delay_lines(frames)?;
     let grids = [detections(&all), schemes(&all, &lines)];

@@ -7,16 +7,16 @@
 use super::detection::detected;
 use super::precision::{Estimator, by_formula, scatter};
 use super::trial::Trial;
-use super::{Study, interval_text};
+use super::{MeasuredStudy, interval_text};
 use crate::engine::EngineError;
 use crate::numerics::intervals::Estimate;
-use crate::numerics::probit::{Point, crossing};
+use crate::numerics::probit::{ProbitPoint, crossing};
 use crate::report::Grid;
 use crate::reproduce::parameters::long_range;
 use crate::reproduce::thesis::measurement;
 use crate::theory::cycles::laser_cycles_for;
-use crate::theory::detection::{Model, PerCycle, Ties};
-use crate::theory::partial::{Purpose, System};
+use crate::theory::detection::{DetectionModel, PerCycle, Ties};
+use crate::theory::partial::{StepPurpose, System};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Exposures around the crossing, relative to where the formula that counts one hit a bin and cycle puts it.
@@ -45,7 +45,7 @@ pub(crate) fn cycles_to_detect(
         };
         let trials = trial.affordable(frames) as f64;
         let share = detected(&trial, frames, seed + u64::from(cycles))?.value;
-        points.push(Point {
+        points.push(ProbitPoint {
             x: f64::from(cycles).sqrt(),
             trials,
             successes: share * trials,
@@ -73,13 +73,14 @@ fn coarse(system: &System, bin_m: f64, candidates: u32, range_m: f64) -> Trial {
 
 /// The guided chip with bins of the system's measurement, an echo of `range_m` in mid-window.
 fn fine(system: &System, range_m: f64, cycles: u32) -> Trial {
-    Trial::of_link(&system.link, range_m, cycles).on(|sensor| sensor.clk_hz = 1.0 / system.bin_s)
+    Trial::of_link(&system.link, range_m, cycles)
+        .with_sensor_change(|sensor| sensor.clk_hz = 1.0 / system.bin_s)
 }
 
 /// Eq. 17 with every photon counted, ties by lot.
-const EQ_17: Model = Model::Poisson(Ties::Random);
+const EQ_17: DetectionModel = DetectionModel::Poisson(Ties::Random);
 /// The same with one hit per bin and cycle.
-const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
+const ONE_HIT: DetectionModel = DetectionModel::Bernoulli(Ties::Random);
 
 /// A detection, by formula and on the chip.
 struct Detection {
@@ -108,7 +109,7 @@ impl Schemes {
         let zooming = system.zooming(range_m);
         let (mut coarse_steps, mut detecting) = (Vec::new(), 0.0);
         for step in &zooming.steps {
-            if let Purpose::Detect { candidates, bin_m } = step.purpose {
+            if let StepPurpose::Detect { candidates, bin_m } = step.purpose {
                 let trial = coarse(system, bin_m, candidates, step.range_m);
                 coarse_steps.push(Detection {
                     name: format!("zooming, {candidates} bins of {bin_m} m at {range_m} m"),
@@ -263,7 +264,7 @@ fn detections<'a>(wanted: f64, all: impl Iterator<Item = &'a Detection>) -> Grid
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let system = long_range();
     let wanted = system.goal.detection;
     let measure = |range_m: f64| Schemes::measure(&system, range_m, frames);

@@ -1,7 +1,7 @@
 //! Eq. 20 and the Cramér-Rao bound against the chip: how far measured times scatter.
 
 use super::trial::{Effect, Trial};
-use super::{Study, interval_text};
+use super::{MeasuredStudy, interval_text};
 use rayon::prelude::*;
 
 use crate::engine::EngineError;
@@ -11,7 +11,7 @@ use crate::report::{Chart, Grid};
 use crate::reproduce::parameters::sigma_over_fwhm;
 use crate::reproduce::thesis::measurement;
 use crate::theory::Pulse;
-use crate::theory::estimators::Expected;
+use crate::theory::estimators::ExpectedHistogram;
 use crate::theory::precision::{cramer_rao, thompson};
 
 /// How a histogram becomes a time.
@@ -64,7 +64,7 @@ pub(super) fn errors_ns(
     let shift = |frame: usize| (frame as f64 + 0.5) / frames as f64 - 0.5;
     let histograms = trial.histograms(frames, seed, shift)?;
     let (background, signal) = levels(trial, &histograms);
-    let expected = Expected {
+    let expected = ExpectedHistogram {
         pulse: Pulse::Gaussian {
             sigma_ns: trial.sigma_ns,
         },
@@ -125,10 +125,10 @@ fn trial(signal: f64) -> Trial {
 pub fn by_formula(trial: &Trial) -> (f64, f64) {
     let cycles = f64::from(trial.cycles);
     let (background, signal) = (cycles * trial.background(), cycles * trial.signal);
-    let of = |formula: fn(f64, f64, f64, f64) -> f64| {
+    let bound = |formula: fn(f64, f64, f64, f64) -> f64| {
         formula(trial.bin_ns(), trial.sigma_ns, background, signal)
     };
-    (of(thompson), of(cramer_rao))
+    (bound(thompson), bound(cramer_rao))
 }
 
 fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
@@ -192,7 +192,7 @@ fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
 fn failures(frames: usize) -> Result<Grid, EngineError> {
     let effects = [Effect::DeadTime, Effect::OneHit, Effect::Overflow];
     let mut grid = measurement(2).grid(1);
-    let narrow = trial(4.0).on(|sensor| sensor.bin_bits = 10);
+    let narrow = trial(4.0).with_sensor_change(|sensor| sensor.bin_bits = 10);
     let wide = Trial {
         sigma_ns: 8.0 * sigma_over_fwhm(),
         ..trial(2.0)
@@ -222,7 +222,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
         let mut cells = vec![name.to_owned(), format!("{:.4}", by_formula(&trial).1)];
         cells.extend(texts(measure(&trial)?));
         for effect in effects {
-            match trial.without(effect) {
+            match trial.without_effect(effect) {
                 Some(trial) => cells.extend(texts(measure(&trial)?)),
                 None => cells.extend(["-".to_owned(), "-".to_owned()]),
             }
@@ -237,7 +237,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<MeasuredStudy, EngineError> {
     let (sweep, chart) = sweep(frames)?;
     let grids = [sweep, failures(frames)?];
     Ok(measurement(2).study(&[("frames", frames)], grids, Some(chart)))

@@ -167,7 +167,7 @@ impl Trial {
             echo_bins: f64::from(candidates) - 1.0,
             ..self
         }
-        .on(|sensor| {
+        .with_sensor_change(|sensor| {
             sensor.mode = Mode::Conventional;
             sensor.bins = candidates as usize;
             sensor.clk_hz = SPEED_OF_LIGHT_M_PER_S / (2.0 * bin_m);
@@ -176,7 +176,7 @@ impl Trial {
 
     /// The same on a sensor whose description is changed, of the same silicon.
     #[must_use]
-    pub(crate) fn on(mut self, change: impl FnOnce(&mut SensorConfig)) -> Self {
+    pub(crate) fn with_sensor_change(mut self, change: impl FnOnce(&mut SensorConfig)) -> Self {
         self.sensor = changed(&self.sensor, change);
         self
     }
@@ -201,7 +201,7 @@ impl Trial {
     }
 
     /// The same without `effect`; `None` where it plays no part.
-    pub(crate) fn without(&self, effect: Effect) -> Option<Self> {
+    pub(crate) fn without_effect(&self, effect: Effect) -> Option<Self> {
         let mut trial = self.clone();
         match effect {
             Effect::Spread => {
@@ -212,11 +212,11 @@ impl Trial {
             // The shortest that the front end follows.
             Effect::DeadTime => {
                 let shortest = trial.sensor.timing().pulses.shortest();
-                trial = trial.on(|sensor| sensor.dead_time_ns = shortest.as_ns());
+                trial = trial.with_sensor_change(|sensor| sensor.dead_time_ns = shortest.as_ns());
             }
             Effect::OneHit => trial.every_pulse = true,
             Effect::Threshold => {
-                trial = trial.on(|sensor| {
+                trial = trial.with_sensor_change(|sensor| {
                     sensor.event_type = EventType::Greater;
                     sensor.threshold = 0;
                 });
@@ -233,7 +233,7 @@ impl Trial {
 
     /// The same photons spread over enough laser cycles that two never meet, with counters that can hold them.
     pub fn in_thin_light(&self) -> Self {
-        let thin = self.without(Effect::Threshold);
+        let thin = self.without_effect(Effect::Threshold);
         Trial {
             signal: self.signal / f64::from(THINNING),
             background_hz: self.background_hz / f64::from(THINNING),

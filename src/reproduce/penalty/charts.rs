@@ -8,7 +8,7 @@ use crate::reproduce::measured::partial::{
 use crate::reproduce::parameters::{demonstrator, long_range};
 use crate::reproduce::thesis::{chart, grid};
 use crate::theory::capacity::full_bins;
-use crate::theory::partial::{Purpose, System};
+use crate::theory::partial::{StepPurpose, System};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Laser cycles of a system's schemes against range. What zooming detects and which windows sliding visits changes
@@ -26,12 +26,14 @@ struct Curves {
 type Points = Vec<(f64, f64)>;
 
 impl Curves {
-    fn of(system: System, to_m: u32) -> Self {
+    fn new(system: System, to_m: u32) -> Self {
         let windows = full_bins(f64::from(to_m), system.window_m);
         let window_end_m = |window: u32| f64::from(window) * system.window_m;
         let detecting = (1..=windows).map(|window| {
             let steps = system.zooming(window_end_m(window)).steps;
-            let detections = steps.iter().filter(|step| step.purpose != Purpose::Measure);
+            let detections = steps
+                .iter()
+                .filter(|step| step.purpose != StepPurpose::Measure);
             detections.map(|step| step.laser_cycles).sum()
         });
         let mut sum = 0.0;
@@ -89,7 +91,7 @@ impl Curves {
 /// Fig. 35: laser cycles of a full histogram.
 pub(in crate::reproduce) fn figure_35() -> Chart {
     let fits = |z_m: f64| SPEED_OF_LIGHT_M_PER_S / (2.0 * z_m * 30.0);
-    let needed = Curves::of(long_range(), 200).full();
+    let needed = Curves::new(long_range(), 200).full();
     chart(35)
         .line("needed, Cramér-Rao", needed)
         .line(
@@ -101,7 +103,7 @@ pub(in crate::reproduce) fn figure_35() -> Chart {
 
 /// Fig. 42: laser cycles of the detection step.
 pub(in crate::reproduce) fn figure_42() -> Chart {
-    let detecting = |system: System| Curves::of(system, 200).detecting();
+    let detecting = |system: System| Curves::new(system, 200).detecting();
     chart(42)
         .line("every photon counts (thesis)", detecting(long_range()))
         .dashed(
@@ -136,16 +138,16 @@ pub(in crate::reproduce) fn figure_43() -> Chart {
 }
 
 /// What was measured, against range.
-fn points(on_chip: &OnChip, of: impl Fn(&AtRange) -> Option<f64>) -> Points {
+fn points(on_chip: &OnChip, value: impl Fn(&AtRange) -> Option<f64>) -> Points {
     let ranges = on_chip.ranges.iter();
     ranges
-        .filter_map(|at| Some((at.range_m, of(at)?)))
+        .filter_map(|at| Some((at.range_m, value(at)?)))
         .collect()
 }
 
 fn schemes(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
-    let curves = Curves::of(on_chip.system, to_m);
-    let measured = |of: fn(&AtRange) -> Option<f64>| points(on_chip, of);
+    let curves = Curves::new(on_chip.system, to_m);
+    let measured = |value: fn(&AtRange) -> Option<f64>| points(on_chip, value);
     chart(figure)
         .line("full and guided", curves.full())
         .line("zooming", curves.zooming())
@@ -159,8 +161,8 @@ fn schemes(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
 }
 
 fn penalties(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
-    let curves = Curves::of(on_chip.system, to_m);
-    let chip = Curves::of(one_hit(on_chip.system), to_m);
+    let curves = Curves::new(on_chip.system, to_m);
+    let chip = Curves::new(one_hit(on_chip.system), to_m);
     chart(figure)
         .line("guided", [(1.0, 1.0), (f64::from(to_m), 1.0)])
         .line("zooming", curves.penalty_of_zooming())
@@ -194,15 +196,15 @@ pub(in crate::reproduce) fn figure_45() -> Chart {
 pub(in crate::reproduce) fn figure_108() -> Chart {
     let chart = schemes(108, demonstrator_on_chip(), 80);
     let lines = demonstrator_on_delay_lines();
-    let at = |cycles: f64| [(lines.range_m, cycles)];
+    let point = |cycles: f64| [(lines.range_m, cycles)];
     chart
         .points(
             "guided in delay-line bins, measured",
-            at(lines.guided.cycles.value),
+            point(lines.guided.cycles.value),
         )
         .points(
             "sliding in delay-line bins, measured",
-            at(lines.sliding().value),
+            point(lines.sliding().value),
         )
 }
 

@@ -6,18 +6,18 @@ use toml::{Table, Value};
 
 use super::files::{name_of, with_files_named};
 use super::varied::varied;
-use super::{Kind, MOST_POINTS, Study};
+use super::{MOST_POINTS, Study, StudyKind};
 use crate::files::{InputError, instead_of};
 use crate::request::{ReadAs, Spelling, refuse_other_kind};
 use crate::settings::Range::Within;
 use crate::settings::{Document, Fault, Section, Settings, keys, schema, words};
-use crate::sweep::design::{Design, MOST_SOBOL_AXES};
+use crate::sweep::design::{MOST_SOBOL_AXES, SamplingDesign};
 use crate::sweep::keys as names;
-use crate::sweep::theory::Asked;
-use crate::sweep::values::{Axis, Varied};
+use crate::sweep::theory::TheorySettings;
+use crate::sweep::values::{Axis, VariedKey};
 
 words! {
-    /// Words for [`Design`].
+    /// Words for [`SamplingDesign`].
     enum DesignWord {
         Grid = "grid",
         Latin = "latin",
@@ -31,7 +31,7 @@ keys! {
         /// Name of the study in reports; the file's name if left out.
         name: String = String::new();
         /// What is made of each point.
-        kind: Kind = Kind::Frame;
+        kind: StudyKind = StudyKind::Frame;
         /// Folder for the results; `sweep-` and the name if left out.
         out: PathBuf = PathBuf::new();
         /// Which points are taken.
@@ -56,7 +56,7 @@ impl Study {
         Section {
             name: "theory",
             what: "Settings of theory",
-            keys: Asked::KEYS,
+            keys: TheorySettings::KEYS,
         },
     ];
 
@@ -175,7 +175,7 @@ impl Study {
 
         check_once(&assignments, &axes, &mut fault);
         let design = design_of(&head, &axes, &mut fault);
-        if head.kind == Kind::Theory && head.replicas > 1 {
+        if head.kind == StudyKind::Theory && head.replicas > 1 {
             fault(
                 "study.replicas",
                 "replicas: theory has no random numbers, so replicas would be equal; leave it out"
@@ -231,7 +231,7 @@ impl Study {
 /// The axes of `[[vary.zip]]`, each with the line that it begins at.
 fn zipped_axes(
     document: &Document,
-    kind: Kind,
+    kind: StudyKind,
     zipped: Option<&Value>,
     fault: &mut impl FnMut(&str, String),
 ) -> Vec<(Option<usize>, Axis)> {
@@ -266,12 +266,12 @@ fn zipped_axes(
             },
         );
         members.sort_by_key(|(line, _)| *line);
-        let members: Vec<Varied> = members.into_iter().map(|(_, varied)| varied).collect();
+        let members: Vec<VariedKey> = members.into_iter().map(|(_, varied)| varied).collect();
         let Some(first) = members.first() else {
             continue;
         };
         if let Some(other) = members.iter().find(|other| other.len() != first.len()) {
-            let count = |varied: &Varied| match varied.len() {
+            let count = |varied: &VariedKey| match varied.len() {
                 Some(1) => format!("{} has 1 value", varied.name),
                 Some(n) => format!("{} has {n} values", varied.name),
                 None => format!("{} has no steps", varied.name),
@@ -319,7 +319,7 @@ fn check_once(
 }
 
 /// Which points are taken; a grid where that is at fault.
-fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -> Design {
+fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -> SamplingDesign {
     let drawn = match (head.design, head.points) {
         (DesignWord::Grid, None) => {
             for varied in axes.iter().flat_map(|axis| &axis.0) {
@@ -331,12 +331,12 @@ fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -
                     fault(&format!("vary.{}", varied.name), message);
                 }
             }
-            return Design::Grid;
+            return SamplingDesign::Grid;
         }
         (DesignWord::Grid, Some(_)) => {
             let message = "points: the values determine the number of points of a grid; leave it out, or give design = \"latin\" or \"sobol\"";
             fault("study.points", message.into());
-            return Design::Grid;
+            return SamplingDesign::Grid;
         }
         (design, None) => {
             fault(
@@ -346,10 +346,10 @@ fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -
                     design.name()
                 ),
             );
-            return Design::Grid;
+            return SamplingDesign::Grid;
         }
-        (DesignWord::Latin, Some(points)) => Design::Latin(points),
-        (DesignWord::Sobol, Some(points)) => Design::Sobol(points),
+        (DesignWord::Latin, Some(points)) => SamplingDesign::Latin(points),
+        (DesignWord::Sobol, Some(points)) => SamplingDesign::Sobol(points),
     };
     if axes.is_empty() {
         fault(
@@ -357,7 +357,7 @@ fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -
             "design: nothing varies; give keys in [vary]".into(),
         );
     }
-    if matches!(drawn, Design::Sobol(_)) && axes.len() > MOST_SOBOL_AXES {
+    if matches!(drawn, SamplingDesign::Sobol(_)) && axes.len() > MOST_SOBOL_AXES {
         let message = format!(
             "design = \"sobol\" has directions for {MOST_SOBOL_AXES} keys, and {} vary; give design = \"latin\"",
             axes.len()

@@ -3,12 +3,12 @@
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::Kind;
+use super::StudyKind;
 use super::files::name_of;
 use crate::files::{Misfit, in_plain_words};
 use crate::sweep::cell::{Column, Holds};
-use crate::sweep::keys::{self as names, Known};
-use crate::sweep::values::{Span, Values, Varied};
+use crate::sweep::keys::{self as names, TypedKey};
+use crate::sweep::values::{ValueSpan, Values, VariedKey};
 
 /// A range, as a study writes it.
 #[derive(Debug, Deserialize)]
@@ -30,7 +30,7 @@ enum Scale {
 }
 
 /// What `[vary]` says of a key.
-pub(super) fn varied(kind: Kind, name: &str, value: &Value) -> Result<Varied, String> {
+pub(super) fn varied(kind: StudyKind, name: &str, value: &Value) -> Result<VariedKey, String> {
     let name = name_of(name);
     let known = names::find(kind, name)?;
     let values = match value {
@@ -57,14 +57,14 @@ pub(super) fn varied(kind: Kind, name: &str, value: &Value) -> Result<Varied, St
         Values::List(list) if list.iter().any(is_list) => Holds::Word,
         _ => known.holds,
     };
-    Ok(Varied {
+    Ok(VariedKey {
         name: name.to_owned(),
         column: Column::new(name, known.key.unit, holds),
         values,
     })
 }
 
-fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
+fn span(known: &TypedKey, name: &str, range: &Table) -> Result<ValueSpan, String> {
     let RangeEntry {
         from,
         to,
@@ -72,7 +72,7 @@ fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
         scale,
     } = range.clone().try_into().map_err(|e: toml::de::Error| {
         let said = e.message().trim();
-        match Misfit::of(said) {
+        match Misfit::from_message(said) {
             Some(misfit) => format!(
                 "{name}: {}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}",
                 misfit.without_cure()
@@ -98,7 +98,7 @@ fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
             from.min(to)
         ));
     }
-    Ok(Span {
+    Ok(ValueSpan {
         from,
         to,
         steps,

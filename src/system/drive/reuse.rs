@@ -11,7 +11,7 @@ use crate::system::worlds::LastWorld;
 
 /// What was not simulated again in a frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Reused {
+pub struct DriveReuse {
     /// The load at gate level.
     pub load: bool,
     /// Ray casting and light of all of the exposure.
@@ -24,16 +24,16 @@ pub struct Reused {
 
 /// What the next frame may reuse.
 #[derive(Debug)]
-pub(super) struct Last {
+pub(super) struct PreviousFrame {
     pub(super) starts: Vec<u16>,
-    pub(super) light: Light,
+    pub(super) light: ExposureLight,
     pub(super) histograms: Histograms,
     pub(super) pixels: Vec<PixelDepth>,
 }
 
 /// What is there during an exposure, and what of it falls on the array.
 #[derive(Debug)]
-pub(super) struct Light {
+pub(super) struct ExposureLight {
     pub(super) stream: PhotonStream,
     pub(super) worlds: Vec<Scene>,
     /// The last of them.
@@ -45,13 +45,13 @@ pub(super) struct Light {
 }
 
 /// Macropixels that have the light, start value and photons of the frame before.
-pub(super) struct Same<'l> {
-    pub(super) last: Option<&'l Last>,
+pub(super) struct UnchangedPixels<'l> {
+    pub(super) last: Option<&'l PreviousFrame>,
     pub(super) is_same: Vec<bool>,
 }
 
-impl<'l> Same<'l> {
-    pub(super) fn of(last: Option<&'l Last>, light: &Light) -> Self {
+impl<'l> UnchangedPixels<'l> {
+    pub(super) fn new(last: Option<&'l PreviousFrame>, light: &ExposureLight) -> Self {
         let is_same = match last {
             None => vec![false; light.pixels.len()],
             Some(last) => {
@@ -59,7 +59,7 @@ impl<'l> Same<'l> {
                 pairs.map(|(before, now)| before == now).collect()
             }
         };
-        Same { last, is_same }
+        UnchangedPixels { last, is_same }
     }
 
     pub(super) fn number(&self) -> usize {
@@ -67,7 +67,7 @@ impl<'l> Same<'l> {
     }
 
     /// The frame before, if this macropixel is the same in it.
-    pub(super) fn last_of(&self, pixel: usize) -> Option<&'l Last> {
+    pub(super) fn last_of(&self, pixel: usize) -> Option<&'l PreviousFrame> {
         self.last.filter(|_| self.is_same[pixel])
     }
 }
@@ -76,5 +76,5 @@ impl<'l> Same<'l> {
 #[derive(Default)]
 pub(super) struct Spent {
     pub(super) run: PhaseTimes,
-    pub(super) reused: Reused,
+    pub(super) reused: DriveReuse,
 }

@@ -162,7 +162,7 @@ impl SelfCalibration {
 mod tests {
     use crate::chip::{Exposure, SensorConfig};
     use crate::scene::Scene;
-    use crate::system::{Drive, DriveFrame, DriveSettings, FrameSettings};
+    use crate::system::{DriveFrame, DriveSettings, DriveSimulation, FrameSettings};
 
     /// Frames of the street, whose right camera has turned by so much.
     fn drive(turn_deg: f64, self_calibrates: bool, number: u32) -> Vec<DriveFrame> {
@@ -179,7 +179,7 @@ mod tests {
             segments: 1,
             ..DriveSettings::new(FrameSettings::new(sensor, scene, exposure))
         };
-        let mut drive = Drive::new(&settings).unwrap();
+        let mut drive = DriveSimulation::new(&settings).unwrap();
         (0..number).map(|_| drive.frame(|_| {}).unwrap()).collect()
     }
 

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use super::reuse::{Last, Light, Same, Spent};
+use super::reuse::{ExposureLight, PreviousFrame, Spent, UnchangedPixels};
 use super::settings::{DriveSettings, FrameTimes, Noise};
-use super::state::Drive;
-use crate::engine::{Answer, Histograms, LitPixel, Work, expose};
+use super::state::DriveSimulation;
+use crate::engine::{Answer, EngineWork, Histograms, LitPixel, expose};
 use crate::guide::{GuideInput, GuideMap};
 use crate::scene::DVec3;
 use crate::system::error::FrameError;
-use crate::system::frame::{go_on, load_starts};
-use crate::system::light::{lit, photon_stream, starts_of};
+use crate::system::frame::{check_not_stopped, load_starts};
+use crate::system::light::{lit_pixels, photon_stream, starts_of};
 use crate::system::pixel::PixelDepth;
-use crate::system::ranger::Known;
+use crate::system::ranger::PixelContext;
 use crate::system::settings::FrameSettings;
 use crate::system::stopwatch::{Stopwatch, timed};
 use crate::system::worlds::{self, LastWorld};
@@ -27,11 +27,11 @@ pub(super) struct Plan {
     pub(super) starts: Vec<u16>,
 }
 
-impl Drive<'_> {
+impl DriveSimulation<'_> {
     /// Asks the guide, and points the windows.
     pub(super) fn plan<A: Answer>(
         &mut self,
-        last: Option<&Last>,
+        last: Option<&PreviousFrame>,
         exposed: &impl Fn(usize) -> A,
         spent: &mut Spent,
     ) -> Result<Plan, FrameError> {
@@ -46,7 +46,7 @@ impl Drive<'_> {
             Noise::Still => frame.seed,
         };
         let mut clock = Stopwatch::new();
-        let mut world = scene.at(times.images_s);
+        let mut world = scene.snapshot(times.images_s);
         if let Some(calibration) = &self.self_calibration {
             world = calibration.rectified(world);
         }
@@ -62,7 +62,7 @@ impl Drive<'_> {
         };
         let guide = frame.guide.estimate(&input)?;
         spent.run.guide_s = clock.lap();
-        go_on(exposed(0))?;
+        check_not_stopped(exposed(0))?;
 
         let seen: Vec<Option<f64>> = last
             .map(|last| last.pixels.iter().map(|p| p.measured_m).collect())
@@ -85,7 +85,12 @@ impl Drive<'_> {
     }
 
     /// The worlds of the exposure and their light, anew where they are not those of `before`.
-    pub(super) fn light(&self, plan: &Plan, before: Option<&Last>, spent: &mut Spent) -> Light {
+    pub(super) fn light(
+        &self,
+        plan: &Plan,
+        before: Option<&PreviousFrame>,
+        spent: &mut Spent,
+    ) -> ExposureLight {
         let FrameSettings {
             sensor,
             scene,
@@ -116,12 +121,12 @@ impl Drive<'_> {
                 let lights = worlds::lights(&worlds, &truths, &stream, known, reuse);
                 let each = worlds::light_of(&lights, exposure);
                 let truth = truths[truths.len() / 2].clone();
-                (truth, each, LastWorld::of(&worlds, truths, lights))
+                (truth, each, LastWorld::new(&worlds, truths, lights))
             }
         };
-        let pixels = lit(sensor, &plan.wanted, &each);
+        let pixels = lit_pixels(sensor, &plan.wanted, &each);
         spent.run.light_s = clock.lap();
-        Light {
+        ExposureLight {
             stream,
             worlds,
             newest,
@@ -135,11 +140,11 @@ impl Drive<'_> {
     pub(super) fn load_and_expose<A: Answer>(
         &self,
         plan: &Plan,
-        light: &Light,
-        same: &Same,
+        light: &ExposureLight,
+        same: &UnchangedPixels,
         exposed: &(impl Fn(usize) -> A + Sync),
         spent: &mut Spent,
-    ) -> Result<(Histograms, Work), FrameError> {
+    ) -> Result<(Histograms, EngineWork), FrameError> {
         let FrameSettings {
             sensor,
             exposure,
@@ -176,12 +181,12 @@ impl Drive<'_> {
     pub(super) fn range(
         &self,
         plan: &Plan,
-        light: &Light,
-        same: &Same,
+        light: &ExposureLight,
+        same: &UnchangedPixels,
         histograms: &Histograms,
     ) -> Vec<PixelDepth> {
         self.ranger.of_array(histograms.counts(), |pixel, counts| {
-            let known = Known {
+            let known = PixelContext {
                 pixel,
                 start: plan.wanted[pixel],
                 true_m: light.truth.range_m[pixel],

@@ -1,6 +1,6 @@
 //! A drive between two frames.
 
-use super::reuse::Last;
+use super::reuse::PreviousFrame;
 use super::self_calibration::SelfCalibration;
 use super::settings::{DriveSettings, FrameClock, FrameTimes};
 use crate::engine::load;
@@ -14,7 +14,7 @@ use crate::units::Time;
 
 /// A drive that goes on from frame to frame; its memory does not grow.
 #[derive(Debug)]
-pub struct Drive<'a> {
+pub struct DriveSimulation<'a> {
     pub(super) settings: &'a DriveSettings,
     pub(super) pointing: Pointing<'a>,
     pub(super) ranger: Ranger<'a>,
@@ -22,11 +22,11 @@ pub struct Drive<'a> {
     pub(super) next: u32,
     pub(super) past: Vec<PastFrame>,
     pub(super) views: CameraViews,
-    pub(super) last: Option<Last>,
+    pub(super) last: Option<PreviousFrame>,
     pub(super) self_calibration: Option<SelfCalibration>,
 }
 
-impl<'a> Drive<'a> {
+impl<'a> DriveSimulation<'a> {
     /// Before the first frame.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl<'a> Drive<'a> {
             ..
         } = &settings.frame;
         let calibration = calibration.as_ref();
-        Ok(Drive {
+        Ok(DriveSimulation {
             settings,
             pointing: Pointing::new(settings.policy, sensor, exposure, calibration),
             ranger: Ranger::new(sensor, exposure, scene, depth, calibration)?,

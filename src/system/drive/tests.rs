@@ -61,7 +61,7 @@ fn settings(scene: Scene, noise: Noise) -> DriveSettings {
 }
 
 fn frames(settings: &DriveSettings, number: u32) -> Vec<DriveFrame> {
-    let mut drive = Drive::new(settings).unwrap();
+    let mut drive = DriveSimulation::new(settings).unwrap();
     (0..number).map(|_| drive.frame(|_| {}).unwrap()).collect()
 }
 
@@ -84,7 +84,7 @@ proptest! {
             prop_assert_eq!(&with.histograms, &without.histograms);
             prop_assert_eq!(&with.pixels, &without.pixels);
             prop_assert_eq!(&with.windows_m, &without.windows_m);
-            prop_assert_eq!(without.reused, Reused::default());
+            prop_assert_eq!(without.reused, DriveReuse::default());
         }
     }
 }
@@ -127,8 +127,12 @@ fn the_guide_sees_the_world_of_its_images_and_the_exposure_a_later_one() {
 #[test]
 fn a_pipelined_guide_makes_frames_come_as_fast_as_the_slower_part() {
     let mut settings = settings(crossing(0.0), Noise::Fresh);
-    let chip_s: f64 = Drive::new(&settings).unwrap().chip_s().iter().sum();
-    let period_s = |settings: &DriveSettings| Drive::new(settings).unwrap().period_s();
+    let chip_s: f64 = DriveSimulation::new(&settings)
+        .unwrap()
+        .chip_s()
+        .iter()
+        .sum();
+    let period_s = |settings: &DriveSettings| DriveSimulation::new(settings).unwrap().period_s();
     assert!((period_s(&settings) - 0.1 - chip_s).abs() < 1e-12);
     settings.clock.pipelined = true;
     assert_eq!(period_s(&settings), 0.1f64.max(chip_s));

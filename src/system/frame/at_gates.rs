@@ -5,7 +5,7 @@ use crate::engine::waveform::{self, View};
 use crate::engine::{GateSimulation, LitPixel};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::system::error::FrameError;
-use crate::system::settings::{EngineKind, FrameSettings, Probe};
+use crate::system::settings::{EngineKind, FrameSettings, GateProbe};
 use crate::waves::WaveFormat;
 
 /// A macropixel as its gates counted.
@@ -25,7 +25,7 @@ impl AtGates {
         settings: &FrameSettings,
         stream: &PhotonStream,
         pixels: &[LitPixel],
-        probe: &Probe,
+        probe: &GateProbe,
     ) -> Result<Self, FrameError> {
         let (sensor, exposure) = (&settings.sensor, &settings.exposure);
         let at = (probe.row, probe.col);
@@ -57,7 +57,7 @@ impl AtGates {
         let (part, pulses) = (&probed.exposure, probed.simulated());
         let mut simulation = GateSimulation::new(sensor, part, at, (1, 1), &[start], &[pulses]);
         let view = View::of_pixel(at, sensor, part, start, pulses, probe.wave_cycles);
-        let format = WaveFormat::of(&probe.waves);
+        let format = WaveFormat::from_path(&probe.waves);
         waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
         probed.counts = simulation.histograms()?.into_counts();
         Ok(probed)

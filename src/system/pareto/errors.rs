@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::chip::WindowLaw;
-use crate::engine::{Exposed, LitPixel};
+use crate::engine::{ExposureResult, LitPixel};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::units::TimeOfFlight;
 
@@ -23,11 +23,11 @@ pub struct Errors {
 
 impl Errors {
     /// Of a cell's macropixels `pixels`: `found`, its counts times `scale`, against `exact`.
-    pub(super) fn between(
+    pub(super) fn compare(
         law: &WindowLaw,
         pixels: &[LitPixel],
-        found: &Exposed,
-        exact: &Exposed,
+        found: &ExposureResult,
+        exact: &ExposureResult,
         scale: f64,
     ) -> Self {
         let (mut differences, mut counts) = (0.0, 0.0);

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::{Method, Point};
+use super::{Method, ParetoPoint};
 
 /// One method over all cells: medians, and the worst cell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Summary {
+pub struct MethodSummary {
     /// Engine and knob.
     pub method: Method,
     /// Run time for a macropixel and laser cycle, ns.
@@ -47,11 +47,11 @@ pub struct Worst {
 }
 
 /// Sums up one method over the cells; `None` without a point.
-pub fn summarise(points: &[Point]) -> Option<Summary> {
+pub fn summarise(points: &[ParetoPoint]) -> Option<MethodSummary> {
     let method = points.first()?.method;
     debug_assert!(points.iter().all(|point| point.method == method));
     // Each figure's values in ascending order: the median is in the middle, the worst at an end.
-    let sorted = |value: &dyn Fn(&Point) -> Option<f64>| {
+    let sorted = |value: &dyn Fn(&ParetoPoint) -> Option<f64>| {
         let mut values: Vec<f64> = points.iter().filter_map(value).collect();
         values.sort_by(f64::total_cmp);
         values
@@ -73,7 +73,7 @@ pub fn summarise(points: &[Point]) -> Option<Summary> {
                 .partial_cmp(&b.errors.depth_rms_m)
                 .expect("no NaN")
         });
-    Some(Summary {
+    Some(MethodSummary {
         method,
         run_time_ns: middle(&run_time)?,
         speed_up: middle(&speed_up)?,

@@ -132,7 +132,7 @@ impl WindowPolicy {
 mod tests {
     use super::*;
     use crate::chip::hslidar_delay_line;
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
     use crate::units::Time;
 
     fn map(sigma_m: f64) -> GuideMap {
@@ -153,7 +153,7 @@ mod tests {
         assert!((bin_m / 0.9375 - 1.0).abs() < 0.02, "{bin_m}");
         let law = WindowLaw::new(&slowed, &Exposure::new(&slowed, periods, 1));
         let inside = (0..20_000).filter(|&n| {
-            let mut random = random_stream(1, Purpose::Guide, n, 0);
+            let mut random = random_stream(1, RandomPurpose::Guide, n, 0);
             let true_m = 80.0 + 0.013 * f64::from(n % 100);
             let guide_m = true_m + sigma_m * normal(&mut random);
             let start = law.start_for(Time::of_flight(guide_m)).unwrap();

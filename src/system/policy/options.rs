@@ -11,9 +11,9 @@ impl WindowPolicy {
     ///
     /// # Errors
     /// Unknown keys and impossible values.
-    pub(crate) fn with(self, text: &str, source: &str) -> Result<Self, InputError> {
+    pub(crate) fn with_changes(self, text: &str, source: &str) -> Result<Self, InputError> {
         let option = format!("{source} {text}");
-        let mut document = Document::of(&option, Table::new());
+        let mut document = Document::from_table(&option, Table::new());
         for assignment in text.split(',').filter(|part| !part.trim().is_empty()) {
             let is_its = |key: &&Key| matches!(key.range, Range::OneOf(words) if words.contains(&assignment.trim()));
             if let Some(key) = Self::KEYS.iter().find(is_its) {
@@ -43,9 +43,9 @@ mod tests {
     #[test]
     fn what_is_not_said_stays() {
         let policy = WindowPolicy::for_sequences();
-        assert_eq!(policy.with("", "windows").unwrap(), policy);
+        assert_eq!(policy.with_changes("", "windows").unwrap(), policy);
         let changed = policy
-            .with("unguided=sweep,overlap=50 %", "windows")
+            .with_changes("unguided=sweep,overlap=50 %", "windows")
             .unwrap();
         let expected = WindowPolicy {
             unguided: Unguided::Sweep,
@@ -54,7 +54,7 @@ mod tests {
         };
         assert_eq!(changed, expected);
         let patient = WindowPolicy::default()
-            .with("patience=3", "windows")
+            .with_changes("patience=3", "windows")
             .unwrap();
         assert_eq!(patient.patience, Some(3));
     }
@@ -78,7 +78,9 @@ mod tests {
             ("steps_in_doubt", "has no value; give key=value"),
             ("wide=true", "unknown key `wide`"),
         ] {
-            let error = WindowPolicy::default().with(text, "windows").unwrap_err();
+            let error = WindowPolicy::default()
+                .with_changes(text, "windows")
+                .unwrap_err();
             assert!(error.to_string().contains(says), "{error}");
             assert_eq!(error.to_string().lines().count(), 1, "{error}");
         }

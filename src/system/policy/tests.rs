@@ -1,9 +1,11 @@
+//! Windows from guides, and the search for targets that a guide has missed.
+
 use std::sync::Arc;
 
 use super::*;
 use crate::chip::{SensorConfig, hslidar};
 use crate::guide::{Guide, GuideInput, NoisyTruth};
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::{DVec3, Object, Scene, Shape};
 use crate::system::{FrameSettings, PixelDepth, take_guided_frame};
 
@@ -30,7 +32,7 @@ fn map(estimates: &[Option<(f64, f64)>]) -> GuideMap {
 }
 
 /// What a sensor that finds every target in its window would measure.
-fn seen(
+fn measured_depths(
     pointing: &Pointing<'_>,
     starts: &[Option<u16>],
     truth_m: &[Option<f64>],
@@ -57,7 +59,7 @@ fn exposures_until_found(
     let mut last = Vec::new();
     for exposure in 0..most {
         let starts = pointing.windows(guide, &last);
-        last = seen(&pointing, &starts, truth_m);
+        last = measured_depths(&pointing, &starts, truth_m);
         for (found, seen) in found.iter_mut().zip(&last) {
             match (*found, seen) {
                 (None, Some(_)) => *found = Some(exposure + 1),
@@ -102,7 +104,7 @@ fn a_macropixel_in_doubt_steps_until_it_has_found_its_target() {
     };
     let truth_m: Vec<Option<f64>> = (0..SIZE * SIZE)
         .map(|pixel| {
-            let mut random = random_stream(3, Purpose::Guide, pixel as u32, 0);
+            let mut random = random_stream(3, RandomPurpose::Guide, pixel as u32, 0);
             Some(guide_m + sigma_m * normal(&mut random))
         })
         .collect();

@@ -6,7 +6,7 @@ use crate::logic::Logic;
 use crate::netlist::{Corner, Library, ModuleBuilder, NetId, Netlist, Timing};
 use crate::theory::front_ends::non_paralysable_hz;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 use rand_philox::{philox4x32_10, u32_to_unit_f64};
 
 /// SPADs of a macropixel.
@@ -107,13 +107,13 @@ impl Bench {
     }
 
     /// Counts of all front ends in this light.
-    pub(super) fn count(&self, photons_hz: f64) -> Point {
+    pub(super) fn count(&self, photons_hz: f64) -> RatePoint {
         let avalanches_hz = non_paralysable_hz(photons_hz, DEAD_TIME_NS * 1e-9);
         let seconds = AVALANCHES / (f64::from(SPADS) * avalanches_hz);
         let mut counter = Counter::new(self);
         self.simulate(photons_hz, BEGIN + Time::from_s(seconds), &mut counter);
         let hz = |count: u64| count as f64 / seconds;
-        Point {
+        RatePoint {
             photons_hz,
             seconds,
             avalanches: hz(counter.avalanches),
@@ -124,7 +124,7 @@ impl Bench {
 }
 
 /// What was counted at one rate, 1/s.
-pub(super) struct Point {
+pub(super) struct RatePoint {
     pub(super) photons_hz: f64,
     /// How long.
     pub(super) seconds: f64,
@@ -225,11 +225,11 @@ pub(super) fn view() -> Layout {
     };
     let timed = |kind: FrontEnd| Entry::hex(format!("{}_TIMED", kind.name().to_uppercase()));
     let group = |title: &str, kind, names| {
-        Group::new(title, inside(kind, names).into_iter().chain([timed(kind)]))
+        SignalGroup::new(title, inside(kind, names).into_iter().chain([timed(kind)]))
     };
     Layout {
         groups: vec![
-            Group::new(
+            SignalGroup::new(
                 "SPADs and clock",
                 [Entry::hex("SPAD_RAW"), Entry::binary("CLK")],
             ),

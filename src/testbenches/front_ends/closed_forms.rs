@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::bench::{Bench, DEAD_TIME_NS, Point, SPADS, STEPS, TOGETHER, WIRES};
+use super::bench::{Bench, DEAD_TIME_NS, RatePoint, SPADS, STEPS, TOGETHER, WIRES};
 use crate::chip::{ChipTiming, FrontEnd};
 use crate::files::InputError;
 use crate::logic::Logic;
@@ -30,7 +30,7 @@ impl Laws {
     pub(super) fn new(bench: &Bench) -> Self {
         let library = Library::generic_40nm();
         let delay = |kind, to| library.delay(kind, 0, to, Corner::Typ).as_s();
-        let width_s = ChipTiming::of(&bench.config)
+        let width_s = ChipTiming::new(&bench.config)
             .pulses
             .shaped
             .expect("it shapes")
@@ -97,7 +97,7 @@ fn mega(hz: f64) -> String {
 }
 
 /// What was counted, rate by rate.
-pub(super) fn table(points: &[Point]) -> String {
+pub(super) fn table(points: &[RatePoint]) -> String {
     let mut grid = Grid::headed(
         "in | avalanches | OR wire | XOR wire | coincidence wire | summation sampled \
         | OR sampled | XOR sampled | coincidence sampled",
@@ -114,32 +114,34 @@ pub(super) fn table(points: &[Point]) -> String {
 }
 
 /// Every rate against its closed form.
-pub(super) fn compare(points: &[Point], laws: &Laws, checks: &mut Checks) {
-    let mut worst =
-        |what: String, allowed: f64, law: &dyn Fn(f64) -> f64, found: &dyn Fn(&Point) -> f64| {
-            // Counts of a process no more irregular than Poisson's.
-            let errors = points.iter().map(|point| {
-                let (expected, found) = (law(point.photons_hz), found(point));
-                let noise = (expected * point.seconds).max(1.0).sqrt() / point.seconds;
-                let beyond = ((found - expected).abs() - 4.0 * noise).max(0.0) / expected;
-                let sigmas = (found - expected).abs() / noise;
-                (beyond, sigmas, found / expected - 1.0, point.photons_hz)
-            });
-            let errors: Vec<_> = errors.collect();
-            let beyond = errors.iter().map(|error| error.0).fold(0.0, f64::max);
-            let worst = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            let &(_, sigmas, off, at) = worst.expect("a sweep");
-            checks.that(
-                what,
-                format!("within {:.0} % beyond 4 sigma", 100.0 * allowed),
-                format!(
-                    "at worst {:+.1} %, {sigmas:.1} sigma, at {} M",
-                    100.0 * off,
-                    mega(at)
-                ),
-                beyond <= allowed,
-            );
-        };
+pub(super) fn compare(points: &[RatePoint], laws: &Laws, checks: &mut Checks) {
+    let mut worst = |what: String,
+                     allowed: f64,
+                     law: &dyn Fn(f64) -> f64,
+                     found: &dyn Fn(&RatePoint) -> f64| {
+        // Counts of a process no more irregular than Poisson's.
+        let errors = points.iter().map(|point| {
+            let (expected, found) = (law(point.photons_hz), found(point));
+            let noise = (expected * point.seconds).max(1.0).sqrt() / point.seconds;
+            let beyond = ((found - expected).abs() - 4.0 * noise).max(0.0) / expected;
+            let sigmas = (found - expected).abs() / noise;
+            (beyond, sigmas, found / expected - 1.0, point.photons_hz)
+        });
+        let errors: Vec<_> = errors.collect();
+        let beyond = errors.iter().map(|error| error.0).fold(0.0, f64::max);
+        let worst = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let &(_, sigmas, off, at) = worst.expect("a sweep");
+        checks.add_verdict(
+            what,
+            format!("within {:.0} % beyond 4 sigma", 100.0 * allowed),
+            format!(
+                "at worst {:+.1} %, {sigmas:.1} sigma, at {} M",
+                100.0 * off,
+                mega(at)
+            ),
+            beyond <= allowed,
+        );
+    };
     worst(
         "avalanches against the non-paralysable law".to_owned(),
         0.0,
@@ -167,9 +169,9 @@ pub(super) fn compare(points: &[Point], laws: &Laws, checks: &mut Checks) {
 }
 
 /// Where counts are most: measured in steps of the sweep, computed between them.
-pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
+pub(super) fn folds(points: &[RatePoint], laws: &Laws, checks: &mut Checks) {
     let step = libm::pow(10f64, 1.0 / f64::from(STEPS));
-    let most = |found: &dyn Fn(&Point) -> f64| {
+    let most = |found: &dyn Fn(&RatePoint) -> f64| {
         let best = points.iter().max_by(|a, b| found(a).total_cmp(&found(b)));
         best.expect("a sweep").photons_hz
     };
@@ -187,14 +189,14 @@ pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
             fold / (1.0 - fold * DEAD_TIME_NS * 1e-9)
         });
         match computed {
-            Some(computed) => checks.that(
+            Some(computed) => checks.add_verdict(
                 format!("{} wire folds over at", kind.name()),
                 format!("{} M photons/s a SPAD", mega(computed)),
                 format!("{} M", mega(found)),
                 // Near its maximum a curve is flat: two steps of the sweep, 1 % of counts.
                 libm::log(found / computed).abs() <= 2.1 * libm::log(step),
             ),
-            None => checks.that(
+            None => checks.add_verdict(
                 format!("{} wire does not fold over", kind.name()),
                 format!("most from {} M on", mega(last / step.powi(2))),
                 format!("{} M", mega(found)),
@@ -203,14 +205,14 @@ pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
         }
     }
     let summation = most(&|point| point.sampled[0]);
-    checks.that(
+    checks.add_verdict(
         "summation does not fold over",
         format!("most from {} M on", mega(last / step.powi(2))),
         format!("{} M", mega(summation)),
         summation >= last / (step.powi(2) * 1.01),
     );
     let xor = points.last().expect("a sweep").sampled[2];
-    checks.that(
+    checks.add_verdict(
         "xor_tree sampled comes to half of CLK",
         mega(0.5 * laws.clk_hz),
         mega(xor),
@@ -219,22 +221,25 @@ pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
 }
 
 /// The waveform's charts: the wires without a clock, and what CLK samples.
-pub(super) fn charts(waves: &Path, points: &[Point], laws: &Laws) -> Result<(), InputError> {
+pub(super) fn charts(waves: &Path, points: &[RatePoint], laws: &Laws) -> Result<(), InputError> {
     let axes = |y: &str| {
         let x = Axis::log("detectable photons on each SPAD (1/s)");
         (x, Axis::log(y))
     };
-    let law = |of: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+    let law = |counts_hz: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
         let rates = (0..=180).map(|step| 1e6 * libm::pow(10f64, f64::from(step) / 60.0));
-        rates.map(|hz| (hz, of(hz))).collect()
+        rates.map(|hz| (hz, counts_hz(hz))).collect()
     };
-    let measured = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
-        points.iter().map(|p| (p.photons_hz, of(p))).collect()
+    let measured = |counts_hz: &dyn Fn(&RatePoint) -> f64| -> Vec<(f64, f64)> {
+        points
+            .iter()
+            .map(|p| (p.photons_hz, counts_hz(p)))
+            .collect()
     };
     let all = f64::from(SPADS);
     let (x, y) = axes("counts of the macropixel (1/s)");
     let title = format!("Fig. 22 without a clock: {SPADS} SPADs, dead time {DEAD_TIME_NS} ns");
-    Chart::new(title, x, y.between(1e6, 1e10))
+    Chart::new(title, x, y.with_range(1e6, 1e10))
         .points("avalanches", measured(&|p| p.avalanches))
         .line("n φ / (1 + φ D)", law(&|hz| all * laws.avalanches_hz(hz)))
         .points("(a) OR tree, gates", measured(&|p| p.wires[0]))
@@ -254,7 +259,7 @@ pub(super) fn charts(waves: &Path, points: &[Point], laws: &Laws) -> Result<(), 
         mega(laws.clk_hz)
     );
     let sampled = |kind| law(&|hz| laws.sampled_hz(kind, hz).expect("it has a closed form"));
-    Chart::new(title, x, y.between(1e5, 1e10))
+    Chart::new(title, x, y.with_range(1e5, 1e10))
         .points("(d) summation, gates: SPADs", measured(&|p| p.sampled[0]))
         .line("n m", sampled(FrontEnd::Summation))
         .dashed(

@@ -69,7 +69,7 @@ pub(super) fn count_alike(bench: &Bench, checks: &mut Checks) {
     let found = after.iter().min().zip(after.iter().max());
     let found = found.map_or("none".to_owned(), |(min, max)| format!("{min} to {max}"));
     let what = "LOCAL_STOP after its CLK fall, in all of them";
-    checks.that(what, "one time", found, same && !after.is_empty());
+    checks.add_verdict(what, "one time", found, same && !after.is_empty());
 }
 
 #[cfg(test)]
@@ -136,7 +136,11 @@ mod tests {
         let text = format!("{has_memory} {late}");
         SensorConfig {
             counter_bits: bits,
-            p_counter_block: Some(OwnBlock::of("mine.json", m.finish().unwrap(), &text)),
+            p_counter_block: Some(OwnBlock::from_module(
+                "mine.json",
+                m.finish().unwrap(),
+                &text,
+            )),
             ..SensorConfig::default()
         }
     }

@@ -47,19 +47,19 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
         3,
         CellKind::Dffsr.area() / custom.area(),
     );
-    let rows = PCounter::ALL.map(Row::of);
+    let rows = PCounter::ALL.map(Row::measure);
     for (p_counter, row) in PCounter::ALL.into_iter().zip(&rows) {
         row.check(p_counter.name(), checks);
         grid.push(row.cells(p_counter.name()));
     }
-    let of = |p_counter: PCounter| &rows[p_counter as usize];
-    let ripple = of(PCounter::Ripple);
-    let synchronous = of(PCounter::Synchronous);
-    let segmented = of(PCounter::Segmented);
-    checks.that(
+    let variant_row = |p_counter: PCounter| &rows[p_counter as usize];
+    let ripple = variant_row(PCounter::Ripple);
+    let synchronous = variant_row(PCounter::Synchronous);
+    let segmented = variant_row(PCounter::Segmented);
+    checks.add_verdict(
         "a synchronous counter avoids the ripple's limit (4.6): shortest CLK period",
-        format!("below {}, ripple's", shown(ripple.period.0)),
-        shown(synchronous.period.0),
+        format!("below {}, ripple's", period_text(ripple.period.0)),
+        period_text(synchronous.period.0),
         synchronous.period.0 < ripple.period.0,
     );
     let nine_stages = ripple.local_stop.1 - synchronous.local_stop.1;
@@ -68,13 +68,13 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
         synchronous.local_stop.1 + Time::from_fs(nine_stages.as_fs() / 3),
         segmented.local_stop.1,
     );
-    checks.that(
+    checks.add_verdict(
         "segmented: shortest CLK period",
-        format!("below {}, ripple's", shown(ripple.period.1)),
-        shown(segmented.period.1),
+        format!("below {}, ripple's", period_text(ripple.period.1)),
+        period_text(segmented.period.1),
         segmented.period.1 < ripple.period.1,
     );
-    checks.that(
+    checks.add_verdict(
         "segmented: transistors, with timing",
         format!("below {}, a synchronous counter's", synchronous.transistors),
         segmented.transistors,
@@ -96,7 +96,7 @@ struct Row {
 }
 
 impl Row {
-    fn of(p_counter: PCounter) -> Self {
+    fn measure(p_counter: PCounter) -> Self {
         let config = sensor(p_counter);
         let blocks = [
             p_counter::circuit(&config),
@@ -112,8 +112,8 @@ impl Row {
         let arrivals = arrivals.expect("a P-counter has no loop");
         let nets = (0..netlist.net_count()).map(NetId::new);
         let settled = nets.filter_map(|net| arrivals.window(net)).map(|w| w.1);
-        let activity = Activity::of(&config, &netlist);
-        let by_paths = MacropixelTiming::of(&config, &TYPICAL, Limits::Ignored, (0, 0));
+        let activity = Activity::simulate(&config, &netlist);
+        let by_paths = MacropixelTiming::analyse(&config, &TYPICAL, Limits::Ignored, (0, 0));
         let ripple = ripple(&config, &TYPICAL);
         Row {
             stage: p_counter.stage_transistors(),
@@ -149,8 +149,8 @@ impl Row {
             per_count(self.activity.changes),
             per_count(self.activity.glitches),
             self.activity.on_local_stop.to_string(),
-            shown(self.period.0),
-            shown(self.period.1),
+            period_text(self.period.0),
+            period_text(self.period.1),
         ]
     }
 
@@ -162,7 +162,7 @@ impl Row {
             simulated,
         );
         let (by_paths, simulated) = self.settled;
-        checks.that(
+        checks.add_verdict(
             format!("{name}: everything settled after a count, all counts"),
             format!("at most {by_paths}, the longest path"),
             simulated,
@@ -174,7 +174,7 @@ impl Row {
         );
         checks.equal(what, 0, self.activity.on_local_stop);
         if let Some(on_equal) = self.activity.on_equal {
-            checks.that(
+            checks.add_verdict(
                 format!(
                     "{name}: changes of EQUAL that are no match, which its flip-flop must keep out"
                 ),
@@ -184,16 +184,16 @@ impl Row {
             );
         }
         let (by_paths, simulated) = self.period;
-        checks.that(
+        checks.add_verdict(
             format!("{name}: shortest CLK period of the gates"),
-            format!("at most {}, by static timing", shown(by_paths)),
-            shown(simulated),
+            format!("at most {}, by static timing", period_text(by_paths)),
+            period_text(simulated),
             by_paths.is_some() && simulated.is_some() && simulated <= by_paths,
         );
     }
 }
 
-fn shown(period: Option<Time>) -> String {
+fn period_text(period: Option<Time>) -> String {
     period.map_or("-".to_owned(), |p| p.to_string())
 }
 
@@ -214,7 +214,7 @@ struct Activity {
 impl Activity {
     /// Counts slowly from start value 0, which a rippling up counter passes through at every power of two, until the
     /// count has come round.
-    fn of(config: &SensorConfig, netlist: &Netlist) -> Self {
+    fn simulate(config: &SensorConfig, netlist: &Netlist) -> Self {
         const GAP: Time = Time::from_ns(10);
         let pin = |name| netlist.net(name).expect("a net of the P-counter");
         let counts = usize::from(config.largest_start()) + 3;
@@ -248,7 +248,7 @@ impl Activity {
         let local_stop = probes.net(Probe::LocalStop);
         let compares = config.p_counter == PCounter::Comparator;
         let equal = compares.then(|| pin(config.p_counter.row().nets[0]));
-        let mut of = Activity {
+        let mut activity = Activity {
             counts,
             changes: 0,
             glitches: 0,
@@ -264,18 +264,18 @@ impl Activity {
             let mut changes = vec![0usize; netlist.net_count()];
             for &(time, net, _) in all[from..until].iter().filter(|c| !inputs.contains(&c.1)) {
                 changes[net.index()] += 1;
-                of.settled = of.settled.max(time - within.start);
+                activity.settled = activity.settled.max(time - within.start);
             }
             let extra = |net: NetId| changes[net.index()] / 2 * 2;
-            of.changes += changes.iter().sum::<usize>();
-            of.glitches += (0..changes.len())
+            activity.changes += changes.iter().sum::<usize>();
+            activity.glitches += (0..changes.len())
                 .map(|net| extra(NetId::new(net)))
                 .sum::<usize>();
-            of.on_local_stop += extra(local_stop);
-            if let (Some(on_equal), Some(equal)) = (&mut of.on_equal, equal) {
+            activity.on_local_stop += extra(local_stop);
+            if let (Some(on_equal), Some(equal)) = (&mut activity.on_equal, equal) {
                 *on_equal += extra(equal);
             }
         }
-        of
+        activity
     }
 }

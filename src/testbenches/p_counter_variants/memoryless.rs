@@ -29,7 +29,7 @@ pub(super) fn coming_round(checks: &mut Checks) {
                 .rising_edges(net)
                 .into_iter()
                 .filter(|&t| t > origin);
-            let ripple = ChipTiming::of(&config).ripple();
+            let ripple = ChipTiming::new(&config).ripple();
             // CLK edge of its own laser cycle with which each came.
             let edge = |t: Time| {
                 let edge = (0..)

@@ -26,7 +26,7 @@ use self::text::{listed, numbers};
 use crate::chip::{
     AfterBorrow, CellLibrary, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc,
 };
-use crate::chip::{Irregular, Window};
+use crate::chip::{Irregular, WindowOutcome};
 use crate::engine::waveform::write_waves;
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
@@ -34,7 +34,7 @@ use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout, Mark};
+use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
 /// The first scene: a start value with its most significant bit high.
 const HIGH: Scene = Scene {
@@ -176,7 +176,7 @@ impl Bench {
     }
 
     /// Falling CLK edge `period`, with which STOP rises.
-    fn at(&self, period: i64) -> Time {
+    fn falling_clk(&self, period: i64) -> Time {
         ORIGIN + self.exposure.falling(period)
     }
 
@@ -190,24 +190,24 @@ impl Bench {
             (RESET_END, "PIXEL_CLEAR", false),
         ];
         for scene in [&HIGH, &SLOW_LASER] {
-            let load = self.at(scene.from) - Time::from_ns(15);
+            let load = self.falling_clk(scene.from) - Time::from_ns(15);
             for (bit, &net) in self.bus("COUNTER_INIT").iter().enumerate() {
                 drives.push(Drive::new(load, net, scene.start >> bit & 1 == 1));
             }
             edges.push((load + Time::from_ns(2), "MEMORY_LOAD", true));
             edges.push((load + Time::from_ns(4), "MEMORY_LOAD", false));
-            edges.push((self.at(scene.from), "ENABLE", true));
-            edges.push((self.at(scene.end()), "ENABLE", false));
+            edges.push((self.falling_clk(scene.from), "ENABLE", true));
+            edges.push((self.falling_clk(scene.end()), "ENABLE", false));
             for cycle in 0..=scene.cycles {
                 let stop = scene.stop(cycle);
-                edges.push((self.at(stop), "STOP", true));
-                edges.push((self.at(stop + 10), "STOP", false));
-                edges.push((self.at(stop - 10), "HIT_CLEAR", true));
-                edges.push((self.at(stop - 9), "HIT_CLEAR", false));
+                edges.push((self.falling_clk(stop), "STOP", true));
+                edges.push((self.falling_clk(stop + 10), "STOP", false));
+                edges.push((self.falling_clk(stop - 10), "HIT_CLEAR", true));
+                edges.push((self.falling_clk(stop - 9), "HIT_CLEAR", false));
             }
             for edge in events(scene) {
-                edges.push((self.at(edge), "SPAD_EVENT", true));
-                edges.push((self.at(edge + 1), "SPAD_EVENT", false));
+                edges.push((self.falling_clk(edge), "SPAD_EVENT", true));
+                edges.push((self.falling_clk(edge + 1), "SPAD_EVENT", false));
             }
         }
         let edges = edges.into_iter();
@@ -229,7 +229,7 @@ impl Bench {
         let corner = SensorConfig::default().corner;
         let timing = Timing::nominal(&self.netlist, CellLibrary::BUILT_IN.cells(), corner);
         let mut kernel = Kernel::new(&self.netlist, &timing);
-        let end = self.at(SLOW_LASER.end() + 40);
+        let end = self.falling_clk(SLOW_LASER.end() + 40);
         write_waves(waves, &self.netlist, &self.view(), |waves| {
             kernel
                 .run(
@@ -245,7 +245,7 @@ impl Bench {
 
     fn view(&self) -> Layout {
         let shared = ["CLK", "STOP", "ENABLE", "SPAD_EVENT", "HIT_CLEAR"].map(Entry::binary);
-        let mut groups = vec![Group::new("Global signals", shared)];
+        let mut groups = vec![SignalGroup::new("Global signals", shared)];
         for (name, tap, _) in CHANNELS {
             let [hit, early_hit] =
                 METDCS.map(|metdc| Entry::hex(Probe::Hit.path(&format!("{name}.{metdc}"))));
@@ -256,34 +256,39 @@ impl Bench {
                 Entry::binary(Probe::LocalStop.path(name)),
                 hit,
             ];
-            groups.push(Group::new(format!("P-counter {name}"), signals));
+            groups.push(SignalGroup::new(format!("P-counter {name}"), signals));
             if tap == Tap::Msb {
                 let name = format!("P-counter {name}, HIT cleared before STOP");
-                groups.push(Group::new(name, [early_hit]));
+                groups.push(SignalGroup::new(name, [early_hit]));
             }
         }
         Layout {
             groups,
             // About the second STOP, where counters that go on or reset show how they differ.
-            zoom: (self.at(HIGH.stop(1) - 16), self.at(HIGH.stop(1) + 40)),
-            marker: Some(self.at(HIGH.stop(1))),
-            marks: vec![Mark::new(self.at(HIGH.stop(1)), "STOP")],
+            zoom: (
+                self.falling_clk(HIGH.stop(1) - 16),
+                self.falling_clk(HIGH.stop(1) + 40),
+            ),
+            marker: Some(self.falling_clk(HIGH.stop(1))),
+            marks: vec![Mark::new(self.falling_clk(HIGH.stop(1)), "STOP")],
         }
     }
 
     /// Rises of LOCAL_STOP in a scene, from its first STOP edge; the load's own are left out.
     fn rises(&self, seen: &Recorder, channel: &str, scene: &Scene) -> Vec<Time> {
-        let from = self.at(scene.from);
+        let from = self.falling_clk(scene.from);
         let rises = seen.rising_edges(self.bus(&Probe::LocalStop.path(channel))[0]);
         let within = rises
             .into_iter()
-            .filter(|&t| t > from && t < self.at(scene.end() + 10));
+            .filter(|&t| t > from && t < self.falling_clk(scene.end() + 10));
         within.map(|t| t - from).collect()
     }
 
     /// Counts that the histogram of a METDC would have after a scene, bin by bin.
     fn counts(&self, seen: &Recorder, metdc: &str, scene: &Scene) -> Vec<usize> {
-        let within = |t: &Time| (self.at(scene.from)..self.at(scene.end() + 10)).contains(t);
+        let within = |t: &Time| {
+            (self.falling_clk(scene.from)..self.falling_clk(scene.end() + 10)).contains(t)
+        };
         let hit = self.bus(&Probe::Hit.path(metdc));
         let rises = hit.iter().map(|&net| seen.rising_edges(net));
         rises
@@ -315,7 +320,7 @@ const ROUND: i64 = 1024;
 fn false_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
     let scene = &HIGH;
     let ripple = |tap| {
-        let timing = ChipTiming::of(&config(tap, AfterBorrow::Wrap));
+        let timing = ChipTiming::new(&config(tap, AfterBorrow::Wrap));
         (timing.ripple(), timing)
     };
     let true_rises = |tap| -> Vec<Time> {
@@ -368,7 +373,7 @@ fn false_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
         checks.equal(what, numbers(early), numbers(&found));
     }
     let arrival = at_reset + timing.local_stop_to_strobe;
-    checks.that(
+    checks.add_verdict(
         "the false strobe comes while the sensor's HIT is still in reset, after STOP",
         format!("before {}", timing.stop_to_hit_release),
         arrival,
@@ -381,7 +386,7 @@ fn repeated_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
     let scene = &SLOW_LASER;
     for (channel, tap, after_borrow) in CHANNELS {
         let config = config(tap, after_borrow);
-        let timing = ChipTiming::of(&config);
+        let timing = ChipTiming::new(&config);
         let every = match (after_borrow, tap) {
             (AfterBorrow::Hold, _) => i64::MAX,
             (AfterBorrow::Wrap, Tap::Borrow) => ROUND,
@@ -410,8 +415,8 @@ fn repeated_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
         checks.equal(what, expected, counted.iter().sum());
         let exposure = Exposure::new(&config, scene.stop_periods as u32, 1);
         let law = match WindowLaw::new(&config, &exposure).window(scene.start as u16) {
-            Window::Open(_) => "one window".to_owned(),
-            Window::Irregular(Irregular::LocalStopRepeats { .. }) => {
+            WindowOutcome::Open(_) => "one window".to_owned(),
+            WindowOutcome::Irregular(Irregular::LocalStopRepeats { .. }) => {
                 "LOCAL_STOP rises more than once in a laser cycle".to_owned()
             }
             other => format!("{other:?}"),

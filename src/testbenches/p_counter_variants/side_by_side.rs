@@ -11,7 +11,7 @@ use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
 use crate::netlist::{ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Layout, SignalGroup};
 
 use super::circuit::{ORIGIN, RESET_END, finished, place_counter};
 use super::text::{listed, numbers};
@@ -70,11 +70,11 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
 
     for p_counter in PCounter::ALL {
         let (name, config) = (p_counter.name(), config(p_counter));
-        let probes = Probes::at(&netlist, name);
+        let probes = Probes::below_instance(&netlist, name);
         let is_reset = p_counter.row().has_memory;
         let first = i64::from(START) + i64::from(is_reset);
         let edges = (first..).step_by(STOP_PERIODS as usize);
-        let ripple = ChipTiming::of(&config).ripple();
+        let ripple = ChipTiming::new(&config).ripple();
         let expected: Vec<Time> = edges
             .take(CYCLES as usize)
             .map(|edge| fall(edge) + ripple)
@@ -87,7 +87,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
             listed(&found),
         );
 
-        let mut model = p_counter::Model::new(&config, START);
+        let mut model = p_counter::PCounterModel::new(&config, START);
         let mut counted = |period: i64| {
             match period {
                 0 if is_reset => model.reset(),
@@ -153,9 +153,9 @@ fn drives(netlist: &Netlist, exposure: &Exposure) -> Vec<Drive> {
 
 fn view(netlist: &Netlist, end: Time) -> Layout {
     let shared = ["CLK", "STOP", "ENABLE"].map(Entry::binary);
-    let mut groups = vec![Group::new("Global signals", shared)];
+    let mut groups = vec![SignalGroup::new("Global signals", shared)];
     for p_counter in PCounter::ALL {
-        let probes = Probes::at(netlist, p_counter.name());
+        let probes = Probes::below_instance(netlist, p_counter.name());
         let own = p_counter.row().nets.iter();
         let own = own.map(|net| Entry::binary(format!("{}.{net}", probes.p_counter())));
         let shown = [
@@ -173,7 +173,7 @@ fn view(netlist: &Netlist, end: Time) -> Layout {
             _ => Entry::binary(probes.path(probe)),
         });
         let name = format!("P-counter {}", p_counter.name());
-        groups.push(Group::new(name, shown.chain(own)));
+        groups.push(SignalGroup::new(name, shown.chain(own)));
     }
     Layout {
         groups,

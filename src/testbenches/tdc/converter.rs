@@ -18,7 +18,7 @@ pub(super) const CLEARED: Time = Time::from_ns(2);
 pub(super) const BEGIN: Time = Time::from_ns(4);
 
 /// The netlist of a converter, and its delays with a mismatch of `sigma`.
-pub(super) fn made(module: &Arc<Module>, sigma: f64, seed: u64) -> (Netlist, Timing) {
+pub(super) fn build(module: &Arc<Module>, sigma: f64, seed: u64) -> (Netlist, Timing) {
     let netlist = Netlist::elaborate(module);
     let nominal = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
     let mismatch = Mismatch { sigma, seed };

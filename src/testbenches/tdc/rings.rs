@@ -11,8 +11,8 @@
 
 use std::path::Path;
 
-use super::converter::{BEGIN, BITS, SIGMA, STAGES, made};
-use crate::chip::tdc::coupling::Row;
+use super::converter::{BEGIN, BITS, SIGMA, STAGES, build};
+use crate::chip::tdc::coupling::RingRow;
 use crate::chip::tdc::ring_oscillator;
 use crate::files::InputError;
 use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
@@ -36,7 +36,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let pins: Vec<_> = pins.iter().map(|(name, net)| (*name, &net[..])).collect();
     let ring = ring_oscillator::circuit(STAGES, BITS);
     (0..RINGS).for_each(|pixel| m.instance(&format!("pixel_{pixel}"), &ring, &pins));
-    let (netlist, timing) = made(
+    let (netlist, timing) = build(
         &m.finish().expect("the testbench's circuit is whole"),
         SIGMA,
         2,
@@ -66,7 +66,11 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let falls = recorder.falling_edges(net);
         // The first fall is from rest.
         let periods: Vec<Time> = falls.windows(2).map(|ends| ends[1] - ends[0]).collect();
-        let model = ring_oscillator::Model::of(&netlist, &timing, &format!("pixel_{pixel}"));
+        let model = ring_oscillator::RingOscillatorModel::from_netlist(
+            &netlist,
+            &timing,
+            &format!("pixel_{pixel}"),
+        );
         wrong += periods
             .iter()
             .filter(|&&period| period != model.period)
@@ -83,12 +87,12 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let square: f64 = hz.iter().map(|hz| (hz / mean - 1.0).powi(2)).sum();
         (square / (hz.len() - 1) as f64).sqrt()
     };
-    let row = |pull_hz| Row {
+    let row = |pull_hz| RingRow {
         free_hz: free_hz.clone(),
         pull_hz,
     };
     let least = row(0.0).least_pull_hz();
-    let coupled = [0.3, 1.1].map(|share| (share, row(share * least).run(4e-6)));
+    let coupled = [0.3, 1.1].map(|share| (share, row(share * least).mean_frequencies_hz(4e-6)));
     let locked = row(least).locked_hz();
     let mut text = format!(
         "{RINGS} rings, {:.1} MHz on average: spread {:.2} % alone",
@@ -106,20 +110,20 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     // The mean of one delay for each stage, each with the mismatch of its cell.
     let inverter = SIGMA / (STAGES as f64).sqrt();
     let alone = spread(&free_hz);
-    checks.that(
+    checks.add_verdict(
         "rings alone: spread of their periods, against an inverter's over the square root of the stages",
         format!("{:.1} % within a half", 100.0 * inverter),
         format!("{:.1} %", 100.0 * alone),
         (alone / inverter - 1.0).abs() < 0.5,
     );
     let [(_, loose), (_, tight)] = &coupled;
-    checks.that(
+    checks.add_verdict(
         "rings coupled by 1.1 of the least pull share one frequency, the mean",
         format!("{:.4} MHz", locked * 1e-6),
         format!("{:.4} MHz, spread {:.1e}", tight[0] * 1e-6, spread(tight)),
         (tight[0] / locked - 1.0).abs() < 1e-6 && spread(tight) < 1e-6,
     );
-    checks.that(
+    checks.add_verdict(
         "rings coupled by 0.3 of it do not",
         "a spread between",
         format!("{:.2} %", 100.0 * spread(loose)),

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use super::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
+use super::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, build};
 use crate::chip::tdc::{clock_counter, delay_line, ring_oscillator};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -12,7 +12,7 @@ use crate::kernel::{Drive, Kernel, Stimulus};
 use crate::netlist::ModuleBuilder;
 use crate::report::Checks;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout, Mark};
+use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
 /// From one interval's beginning to the next one's.
 const SLOT: Time = Time::from_ns(40);
@@ -37,7 +37,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     m.instance("clock_counter", &clock_counter::circuit(BITS), &with_clk);
     m.instance("ring", &ring_oscillator::circuit(STAGES, BITS), &pins);
     m.instance("line", &delay_line::circuit(CODES), &pins);
-    let (netlist, timing) = made(
+    let (netlist, timing) = build(
         &m.finish().expect("the testbench's circuit is whole"),
         SIGMA,
         1,
@@ -70,7 +70,8 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let codes = ["ring.CODE", "line.SEEN"];
     let nets = codes.map(|path| netlist.signal(path).expect("it was built above"));
     let models = [
-        ring_oscillator::Model::of(&netlist, &timing, "ring").steps(1 << BITS),
+        ring_oscillator::RingOscillatorModel::from_netlist(&netlist, &timing, "ring")
+            .steps(1 << BITS),
         delay_line::model(&netlist, &timing, "line"),
     ];
     let mut kernel = Kernel::new(&netlist, &timing);
@@ -92,7 +93,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let expected = models.each_ref().map(|steps| steps.code(interval));
         let ones = found[1].map(|seen| seen.count_ones() as usize);
         let found = [found[0].map(|code| code as usize), ones];
-        checks.that(
+        checks.add_verdict(
             format!("{interval} in the waveform: codes of ring and line"),
             format!("{} and {}", expected[0], expected[1]),
             found
@@ -110,7 +111,7 @@ fn begin(slot: i64) -> Time {
 }
 
 fn view() -> Layout {
-    let group = |title: &str, entries: &[Entry]| Group::new(title, entries.iter().cloned());
+    let group = |title: &str, entries: &[Entry]| SignalGroup::new(title, entries.iter().cloned());
     Layout {
         groups: vec![
             group(

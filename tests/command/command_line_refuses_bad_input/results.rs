@@ -3,14 +3,14 @@
 use guided_dtof::files::NpyHead;
 use std::process::Command;
 
-use super::{folder, gdtof, replay, with};
+use super::{folder, gdtof, replay, with_value};
 
 #[test]
 fn an_existing_result_survives_a_failed_run() {
     let folder = folder();
     let out = folder.path().join("h.csv");
     std::fs::write(&out, "precious").unwrap();
-    let arguments = with(&replay(&["--out", "h.csv"]), "--events", "early.csv");
+    let arguments = with_value(&replay(&["--out", "h.csv"]), "--events", "early.csv");
     assert_eq!(gdtof(folder.path(), &arguments).status.code(), Some(2));
     assert_eq!(std::fs::read_to_string(&out).unwrap(), "precious");
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use super::{EVENTS, INITS, folder, gdtof, refused, replay, with};
+use super::{EVENTS, INITS, folder, gdtof, refused, replay, with_value};
 
 /// Runs a command with little address space: one that fills its memory aborts (status 134) instead of taking ours.
 #[cfg(unix)]
@@ -56,8 +56,8 @@ fn input_that_is_no_text_or_never_ends_is_refused_early() {
     for (source, says) in sources {
         let gate = replay(&["--engine", "gate", "--sdf", source]);
         for arguments in [
-            with(&replay(&[]), "--inits", source),
-            with(&replay(&[]), "--events", source),
+            with_value(&replay(&[]), "--inits", source),
+            with_value(&replay(&[]), "--events", source),
             replay(&["--sensor", source]),
             gate,
             vec!["frame", "--scene", source],
@@ -90,7 +90,7 @@ fn endless_text_is_refused_and_long_tables_are_read() {
         shell.args(["-c", &command, env!("CARGO_BIN_EXE_gdtof")]);
         shell.args(arguments).current_dir(dir).output().unwrap()
     };
-    let events = with(&replay(&[]), "--events", "/dev/stdin");
+    let events = with_value(&replay(&[]), "--events", "/dev/stdin");
     let scene = ["frame", "--scene", "/dev/stdin"];
     let captures = ["range", "--format", "tmf8820", "--histograms", "/dev/stdin"];
     for (producer, arguments, says) in [

@@ -80,7 +80,7 @@ impl Activity {
     }
 
     /// What each net did until `end`, which must not be before its last change.
-    pub fn until(&self, end: Time) -> Vec<NetActivity> {
+    pub fn net_activity(&self, end: Time) -> Vec<NetActivity> {
         let close = |state: &State| {
             let mut state = *state;
             state.spend(end);
@@ -139,7 +139,7 @@ impl Observer for Activity {
     }
 
     #[inline]
-    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
+    fn inertial_glitch(&mut self, time: Time, net: NetId, pulses: u32) {
         if time >= self.from {
             let found = &mut self.nets[net.index()].found;
             found.inertial_glitch_edges += 2 * u64::from(pulses);
@@ -174,7 +174,7 @@ mod tests {
             activity.change(Time::from_fs(time), net, value);
         }
         assert_eq!(activity.from().as_fs(), from);
-        activity.until(Time::from_fs(end))[net.index()]
+        activity.net_activity(Time::from_fs(end))[net.index()]
     }
 
     #[test]
@@ -190,9 +190,9 @@ mod tests {
         let netlist = one_shot();
         let net = netlist.net("Z").unwrap();
         let mut activity = Activity::new(&netlist, Time::from_fs(10));
-        activity.swallowed(Time::from_fs(9), net, 1);
-        activity.swallowed(Time::from_fs(10), net, 3);
-        let found = activity.until(Time::from_fs(20))[net.index()];
+        activity.inertial_glitch(Time::from_fs(9), net, 1);
+        activity.inertial_glitch(Time::from_fs(10), net, 3);
+        let found = activity.net_activity(Time::from_fs(20))[net.index()];
         assert_eq!(found.inertial_glitch_edges, 6);
     }
 
@@ -225,7 +225,7 @@ mod tests {
             Kernel::new(&netlist, timing)
                 .run(&mut Stimulus::sorted(drives.clone()), end, &mut activity)
                 .expect("no loop of cells without delay");
-            let nets = activity.until(end);
+            let nets = activity.net_activity(end);
             let glitches = |net: NetId| {
                 let found = nets[net.index()];
                 let glitches = [found.transport_glitch_edges, found.inertial_glitch_edges];

@@ -140,15 +140,15 @@ impl CheckedPins {
         self.start[net] != self.start[net + 1]
     }
 
-    /// Positions in the list of all, for [`CheckedPins::at`].
+    /// Positions in the list of all, for [`CheckedPins::pin`].
     #[inline]
-    pub(super) fn of(&self, net: usize) -> std::ops::Range<usize> {
+    pub(super) fn positions(&self, net: usize) -> std::ops::Range<usize> {
         self.start[net] as usize..self.start[net + 1] as usize
     }
 
     /// Flip-flop (for D) or bank (for other pins), and pin.
     #[inline]
-    pub(super) fn at(&self, position: usize) -> (u32, usize) {
+    pub(super) fn pin(&self, position: usize) -> (u32, usize) {
         let (index, pin) = self.loads[position];
         (index, pin as usize)
     }

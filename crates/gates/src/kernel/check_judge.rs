@@ -5,7 +5,7 @@
 
 use super::check_banks::{Bank, CLOCK, DATA, Data, RESET, SET};
 use super::check_report::{BINS, Policy, slack_bin};
-use super::timing_checks::{Found, History, NEVER, TimingChecks};
+use super::timing_checks::{History, MeasuredSlack, NEVER, TimingChecks};
 use crate::logic::Logic;
 use crate::netlist::{CheckKind, Control, Edge};
 
@@ -22,8 +22,8 @@ impl TimingChecks {
         // All histories first, so that the judgement sees the whole instant.
         touched.retain(|&net| self.nets[net as usize].advance(self.now_fs));
         for &net in &touched {
-            for position in self.pins.of(net as usize) {
-                let (index, pin) = self.pins.at(position);
+            for position in self.pins.positions(net as usize) {
+                let (index, pin) = self.pins.pin(position);
                 if pin == DATA {
                     self.unsettle(index);
                 }
@@ -31,8 +31,8 @@ impl TimingChecks {
         }
         if self.now_fs >= self.not_before_fs {
             for &net in &touched {
-                for position in self.pins.of(net as usize) {
-                    match self.pins.at(position) {
+                for position in self.pins.positions(net as usize) {
+                    match self.pins.pin(position) {
                         (flip_flop, DATA) => self.judge_data(flip_flop),
                         (bank, pin) => self.judge_bank(bank as usize, pin),
                     }
@@ -160,7 +160,7 @@ impl TimingChecks {
     #[inline]
     fn edge_nearest_setup(&self, index: u32, data: History) -> Option<Edge> {
         let limits = &self.limits[self.flip_flops[index as usize].limits as usize];
-        let limit = |edge| limits.at(Control::Reset, CheckKind::Setup, edge);
+        let limit = |edge| limits.limit_fs(Control::Reset, CheckKind::Setup, edge);
         let before = |edge: &Edge| ![NEVER, self.now_fs].contains(&data.last(*edge));
         let edges = Edge::BOTH.into_iter().filter(before);
         edges.max_by_key(|&edge| data.last(edge) + i64::from(limit(edge)))
@@ -194,12 +194,12 @@ impl TimingChecks {
             SET => Control::Set,
             _ => Control::Reset,
         };
-        let limit_fs = self.limits[bank.limits as usize].at(control, kind, edge);
+        let limit_fs = self.limits[bank.limits as usize].limit_fs(control, kind, edge);
         let slack_fs = self.now_fs - since_fs - i64::from(limit_fs);
         let is_asynchronous = bank.is_asynchronous && kind.concerns_data();
         let tally = &mut self.summaries[kind as usize];
         let count = members.len() as u64;
-        let found = Found {
+        let found = MeasuredSlack {
             time_fs: self.now_fs,
             slack_fs,
             flip_flop: members[0],
@@ -215,21 +215,21 @@ impl TimingChecks {
             tally.checked += count;
             tally.histogram[slack_bin(slack_fs)] += count;
             // The first smallest; of one instant, the first in the netlist.
-            let rank = |f: &Found| (f.slack_fs, f.time_fs, f.flip_flop);
+            let rank = |f: &MeasuredSlack| (f.slack_fs, f.time_fs, f.flip_flop);
             if tally.worst.is_none_or(|worst| rank(&found) < rank(&worst)) {
                 tally.worst = Some(found);
             }
         }
         if slack_fs < 0 {
             for &flip_flop in members {
-                self.violated(Found { flip_flop, ..found });
+                self.violated(MeasuredSlack { flip_flop, ..found });
             }
         }
         slack_fs
     }
 
     #[cold]
-    fn violated(&mut self, found: Found) {
+    fn violated(&mut self, found: MeasuredSlack) {
         if self.found.len() < MOST_VIOLATIONS {
             self.found.push(found);
         } else {

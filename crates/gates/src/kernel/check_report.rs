@@ -63,7 +63,7 @@ pub struct Violation {
 
 /// Where and when a slack was smallest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Place {
+pub struct SlackLocation {
     /// Dotted path of the flip-flop.
     pub cell: String,
     /// The pin measured against CK, or whose pulse it is.
@@ -88,7 +88,7 @@ pub struct CheckSummary {
     /// Times it was broken at asynchronous samplers.
     pub asynchronous_violated: u64,
     /// The first smallest slack, asynchronous samplers left out; none if nothing was checked.
-    pub worst: Option<Place>,
+    pub worst: Option<SlackLocation>,
     /// Slacks by bin ([`BINS`] of [`BIN_FS`] from [`FIRST_BIN_FS`]), asynchronous samplers left out.
     pub histogram: Vec<u64>,
 }

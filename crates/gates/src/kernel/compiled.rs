@@ -101,7 +101,7 @@ impl DelaySet {
     /// The sets of `timing` for the first output, in its order, and then those for a second output that differ from
     /// the first; and, by set of `timing`, where that of each output is. Cells look up one set where both are the same.
     pub(super) fn all(netlist: &Netlist, timing: &Timing) -> (Vec<Self>, Vec<[u32; 2]>) {
-        let by_value = |arc: &ArcDelay| Logic::ALL.map(|to| arc.to(to));
+        let by_value = |arc: &ArcDelay| Logic::ALL.map(|to| arc.delay_fs(to));
         let to_output = |set: &CellDelays, output: usize| {
             DelaySet(set.each_ref().map(|outputs| by_value(&outputs[output])))
         };
@@ -131,7 +131,7 @@ impl DelaySet {
     /// Delays by new value for the pins in which `inputs` and `evaluated` differ: the shortest of the arcs
     /// concerned. A flip-flop's D is no cause; `inputs` and `evaluated` must agree on it.
     #[inline]
-    pub(super) fn after(&self, inputs: u8, evaluated: u8) -> [u32; 4] {
+    pub(super) fn shortest_delays(&self, inputs: u8, evaluated: u8) -> [u32; 4] {
         let differing = inputs ^ evaluated;
         let mut pairs = (differing | differing >> 1) & 0b0101_0101;
         debug_assert!(pairs != 0, "evaluated without a cause");
@@ -215,7 +215,7 @@ impl Loads {
     }
 
     #[inline]
-    pub(super) fn of(&self, net: usize) -> &[Load] {
+    pub(super) fn net_loads(&self, net: usize) -> &[Load] {
         &self.loads[self.range_of(net)]
     }
 
@@ -227,7 +227,7 @@ impl Loads {
 
     /// The load at a place.
     #[inline]
-    pub(super) fn at(&self, place: usize) -> Load {
+    pub(super) fn load(&self, place: usize) -> Load {
         self.loads[place]
     }
 }
@@ -285,7 +285,7 @@ mod tests {
         let set = DelaySet::all(&netlist, &timing).0[timing.set_of(0) as usize];
         let arc =
             |pin: usize| library.arcs(CellKind::Mux2)[pin][0].delay_fs(Corner::Typ, Logic::One);
-        let by_pins = |differing: u8| set.after(differing, 0)[Logic::One as usize];
+        let by_pins = |differing: u8| set.shortest_delays(differing, 0)[Logic::One as usize];
         assert_eq!(by_pins(0b00_00_01), arc(0));
         assert_eq!(by_pins(0b10_00_00), arc(2));
         assert_eq!(by_pins(0b11_01_00), arc(1).min(arc(2)));

@@ -31,7 +31,7 @@ impl Lanes {
     }
 
     /// Known values, one bit a lane.
-    pub const fn known(bits: u64) -> Self {
+    pub const fn from_bits(bits: u64) -> Self {
         Lanes {
             one: bits,
             zero: !bits,

@@ -248,7 +248,7 @@ impl LaneKernel {
     fn clock(&mut self, net: usize) {
         let edge = self.edges[net];
         for at in self.fan_out.clocks.range_of(net) {
-            let index = self.fan_out.clocks.at(at).cell();
+            let index = self.fan_out.clocks.load(at).cell();
             let cell = &self.cells[index];
             let data = self.nets[cell.inputs[0] as usize].value;
             if edge.may_have_risen | edge.rose & cell.state.differs(data) != 0 {
@@ -281,7 +281,7 @@ impl LaneKernel {
         observer.change(Time::from_fs(self.now_fs), NetId::new(net), mask, after);
         let rose = mask & before.zero & after.one;
         let may_have_risen = mask & (before.zero & after.unknown() | before.unknown() & after.one);
-        for &load in self.fan_out.active.of(net) {
+        for &load in self.fan_out.active.net_loads(net) {
             let cell = &mut self.cells[load.cell()];
             cell.changed[load.pin()] |= mask;
             if !cell.is_dirty {
@@ -291,7 +291,7 @@ impl LaneKernel {
         }
         // A clock going low causes nothing.
         let changed = mask & !after.zero;
-        if changed != 0 && !self.fan_out.clocks.of(net).is_empty() {
+        if changed != 0 && !self.fan_out.clocks.net_loads(net).is_empty() {
             let edge = &mut self.edges[net];
             if edge.changed == 0 {
                 self.risen.push(net as u32);
@@ -386,7 +386,7 @@ impl LaneKernel {
             }
             left &= !alike;
             debug_assert!(pins != 0, "an output moved without a cause");
-            let delays_fs = self.delays[set as usize].after(pins, 0);
+            let delays_fs = self.delays[set as usize].shortest_delays(pins, 0);
             for (mask, to) in [
                 (value.one, Logic::One),
                 (value.zero, Logic::Zero),

@@ -20,7 +20,7 @@ pub trait Observer {
     /// `net`'s driver went to another value and back in less than its delay, so that `pulses` pulses never come.
     /// Nothing changes.
     #[inline]
-    fn swallowed(&mut self, _: Time, _: NetId, _pulses: u32) {}
+    fn inertial_glitch(&mut self, _: Time, _: NetId, _pulses: u32) {}
 
     /// Whether it needs [`Observer::change`] at all. Where it does not, the kernel leaves out calls that take long.
     #[inline]
@@ -54,9 +54,9 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
 
     #[inline]
-    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
-        self.0.swallowed(time, net, pulses);
-        self.1.swallowed(time, net, pulses);
+    fn inertial_glitch(&mut self, time: Time, net: NetId, pulses: u32) {
+        self.0.inertial_glitch(time, net, pulses);
+        self.1.inertial_glitch(time, net, pulses);
     }
 
     #[inline]
@@ -77,8 +77,8 @@ impl<O: Observer + ?Sized> Observer for &mut O {
     }
 
     #[inline]
-    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
-        (**self).swallowed(time, net, pulses);
+    fn inertial_glitch(&mut self, time: Time, net: NetId, pulses: u32) {
+        (**self).inertial_glitch(time, net, pulses);
     }
 
     #[inline]

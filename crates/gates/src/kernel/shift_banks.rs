@@ -93,13 +93,13 @@ impl ShiftBank {
         for first in firsts {
             let chain: Vec<usize> = std::iter::successors(Some(first), next).collect();
             if chain.len() >= FEWEST {
-                banks.push(ShiftBank::of(netlist, timing, &chain));
+                banks.push(ShiftBank::new(netlist, timing, &chain));
             }
         }
         banks
     }
 
-    fn of(netlist: &Netlist, timing: &Timing, chain: &[usize]) -> Self {
+    fn new(netlist: &Netlist, timing: &Timing, chain: &[usize]) -> Self {
         let cell = |index: usize| &netlist.cells()[index];
         let words = vec![0; chain.len().div_ceil(64)];
         ShiftBank {

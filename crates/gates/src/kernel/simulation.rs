@@ -263,7 +263,7 @@ impl Kernel {
             state.clock_before = value;
             let (net, value) = (NetId::new(net as usize), Logic::from_bits(value));
             observer.change(Time::from_fs(self.now_fs), net, value);
-            for &load in self.fan_out.active.of(net.index()) {
+            for &load in self.fan_out.active.net_loads(net.index()) {
                 let cell = &mut self.cells[load.cell()];
                 debug_assert!(!cell.kind.is_flip_flop(), "a reset or set");
                 let shift = 2 * load.pin();
@@ -354,12 +354,12 @@ impl Kernel {
         if value == Logic::Zero.bits() {
             self.nets[net].clock_before = value;
         } else if !self.nets[net].has_risen
-            && (!self.fan_out.clocks.of(net).is_empty() || self.clocks_a_bank(net))
+            && (!self.fan_out.clocks.net_loads(net).is_empty() || self.clocks_a_bank(net))
         {
             self.nets[net].has_risen = true;
             self.risen.push(net as u32);
         }
-        for &load in self.fan_out.active.of(net) {
+        for &load in self.fan_out.active.net_loads(net) {
             let cell = &mut self.cells[load.cell()];
             let shift = 2 * load.pin();
             cell.inputs = cell.inputs & !(3 << shift) | value << shift;
@@ -379,7 +379,7 @@ impl Kernel {
                 self.clock_bank(bank, observer);
             }
         }
-        let loads = self.fan_out.clocks.of(net);
+        let loads = self.fan_out.clocks.net_loads(net);
         self.statistics.evaluations += loads.len() as u64;
         let (cells, nets) = (&self.cells[..], &self.nets[..]);
         // Most hold already what they would take.
@@ -413,7 +413,7 @@ impl Kernel {
         } else {
             let (output, set) = (cell.outputs[0], cell.delays[0]);
             let value = self.tables.gate(kind, inputs);
-            let delays = self.delays[set as usize].after(inputs, evaluated);
+            let delays = self.delays[set as usize].shortest_delays(inputs, evaluated);
             self.schedule(output, value, &delays, observer);
         }
     }
@@ -435,10 +435,10 @@ impl Kernel {
         cell.state = state;
         let (outputs, [to_q, to_qn]) = (cell.outputs, cell.delays);
         let inverted = Logic::from_bits(state).inverted().bits();
-        let mut delays = self.delays[to_q as usize].after(inputs, before);
+        let mut delays = self.delays[to_q as usize].shortest_delays(inputs, before);
         self.schedule(outputs[0], state, &delays, observer);
         if to_qn != to_q {
-            delays = self.delays[to_qn as usize].after(inputs, before);
+            delays = self.delays[to_qn as usize].shortest_delays(inputs, before);
         }
         self.schedule(outputs[1], inverted, &delays, observer);
     }
@@ -458,7 +458,7 @@ impl Kernel {
             }
             // Back to where the net is, from one known value to the other.
             if state.value == value && (value | state.pending) <= Logic::One.bits() {
-                observer.swallowed(Time::from_fs(self.now_fs), NetId::new(net as usize), 1);
+                observer.inertial_glitch(Time::from_fs(self.now_fs), NetId::new(net as usize), 1);
             }
             state.generation = (state.generation + 1) & (u32::MAX >> 2);
             state.pending = NONE;
@@ -480,7 +480,7 @@ impl Kernel {
         let sent = self.transport.send(net as usize, present, value, time_fs);
         if sent.swallowed > 0 {
             let now = Time::from_fs(self.now_fs);
-            observer.swallowed(now, NetId::new(net as usize), sent.swallowed);
+            observer.inertial_glitch(now, NetId::new(net as usize), sent.swallowed);
         }
         if sent.arrives {
             self.wheel.push(Event {

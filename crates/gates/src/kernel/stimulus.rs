@@ -38,7 +38,7 @@ type Drives<'a> = Box<dyn Iterator<Item = Drive> + Send + 'a>;
 /// let release = [(0, true), (3, false)].map(|(ns, level)| Drive::new(Time::from_ns(ns), reset, level));
 /// // A clock is a stream, too: 20 half periods, and no memory for them.
 /// let ticks = clock(clk, Frequency::from_hz(500_000_000), Time::ZERO, 0, 20);
-/// let stimulus = Stimulus::sorted(release).with(ticks);
+/// let stimulus = Stimulus::sorted(release).with_drives(ticks);
 /// let times: Vec<i64> = stimulus.map(|drive| drive.time.as_fs() / 1_000_000).collect();
 /// assert_eq!(times[..6], [0, 0, 1, 2, 3, 3]);
 /// ```
@@ -65,7 +65,7 @@ impl<'a> Stimulus<'a> {
 
     /// Both together; `other` is in time order, too. Of drives at the same time, those that were here first come first.
     #[must_use]
-    pub fn with(self, other: impl IntoIterator<Item = Drive, IntoIter: Send + 'a>) -> Self {
+    pub fn with_drives(self, other: impl IntoIterator<Item = Drive, IntoIter: Send + 'a>) -> Self {
         Stimulus::merge([self, Stimulus::new(other)])
     }
 
@@ -133,11 +133,11 @@ mod tests {
     #[test]
     fn streams_merge_in_time_order_and_ties_in_stream_order() {
         let net = NetId::new;
-        let at = |fs, n, v| Drive::new(Time::from_fs(fs), net(n), v);
-        let a = [at(0, 0, true), at(5, 0, false)];
-        let b = [at(0, 1, true), at(3, 1, false)];
+        let drive = |fs, n, v| Drive::new(Time::from_fs(fs), net(n), v);
+        let a = [drive(0, 0, true), drive(5, 0, false)];
+        let b = [drive(0, 1, true), drive(3, 1, false)];
         let merged: Vec<_> = Stimulus::new(a)
-            .with(b)
+            .with_drives(b)
             .map(|d| (d.time.as_fs(), d.net.index()))
             .collect();
         assert_eq!(merged, [(0, 0), (0, 1), (3, 1), (5, 0)]);

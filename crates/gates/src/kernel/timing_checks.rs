@@ -35,7 +35,7 @@
 use std::collections::HashMap;
 
 use super::check_banks::{Bank, CheckedPins, FlipFlop, banks, flip_flops};
-use super::check_report::{BINS, CheckReport, CheckSummary, Place, Policy, Violation};
+use super::check_report::{BINS, CheckReport, CheckSummary, Policy, SlackLocation, Violation};
 use super::observer::Observer;
 use crate::logic::Logic;
 use crate::netlist::{
@@ -79,7 +79,7 @@ impl History {
 }
 
 #[derive(Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct MeasuredSlack {
     pub time_fs: i64,
     pub slack_fs: i64,
     pub flip_flop: u32,
@@ -106,7 +106,7 @@ pub struct TimingChecks {
     /// Cells to be made unknown.
     pub(super) doubtful: Vec<u32>,
     pub(super) summaries: [Tally; CheckKind::ALL.len()],
-    pub(super) found: Vec<Found>,
+    pub(super) found: Vec<MeasuredSlack>,
     pub(super) left_out: u64,
 }
 
@@ -116,7 +116,7 @@ pub(super) struct Tally {
     pub violated: u64,
     pub asynchronous: u64,
     pub asynchronous_violated: u64,
-    pub worst: Option<Found>,
+    pub worst: Option<MeasuredSlack>,
     pub histogram: [u64; BINS],
 }
 
@@ -126,7 +126,7 @@ impl TimingChecks {
         let mut flip_flops = flip_flops(netlist);
         let banks = banks(&mut flip_flops);
         let limits = [CellKind::Dffr, CellKind::Dffsr]
-            .map(|kind| InstanceLimits::of(library.checks(kind), corner));
+            .map(|kind| InstanceLimits::from_library(library.checks(kind), corner));
         let unknown = History {
             rose_fs: NEVER,
             fell_fs: NEVER,
@@ -224,7 +224,7 @@ impl TimingChecks {
         // Within an instant in the order of the netlist.
         self.found
             .sort_by_key(|f| (f.time_fs, f.flip_flop, f.kind, f.pin));
-        let path = |found: &Found| {
+        let path = |found: &MeasuredSlack| {
             let cell = self.flip_flops[found.flip_flop as usize].cell;
             netlist.cell_path(cell as usize)
         };
@@ -236,7 +236,7 @@ impl TimingChecks {
                 violated: tally.violated,
                 asynchronous_checked: tally.asynchronous,
                 asynchronous_violated: tally.asynchronous_violated,
-                worst: tally.worst.as_ref().map(|found| Place {
+                worst: tally.worst.as_ref().map(|found| SlackLocation {
                     cell: path(found),
                     pin: PINS[found.pin as usize].to_owned(),
                     time_fs: found.time_fs,
@@ -298,7 +298,7 @@ impl Observer for TimingChecks {
         }
         let index = net.index();
         if self.pins.has_any(index) {
-            self.nets[index].now = value.seen();
+            self.nets[index].now = value.as_gate_input();
             self.touched.push(index as u32);
         }
     }

@@ -85,7 +85,7 @@ impl TimeWheel {
         let slot = event.time_fs >> SLOT_BITS;
         debug_assert!(slot >= self.present, "an event before the present");
         if slot >= self.horizon {
-            return self.put(slot, event);
+            return self.insert_event(slot, event);
         }
         let key = (event.time_fs, event.net);
         // What is pushed last mostly comes last.
@@ -113,13 +113,13 @@ impl TimeWheel {
         let stay = self.near.partition_point(is_near);
         for at in stay..self.near.len() {
             let event = self.near[at];
-            self.put(event.time_fs >> SLOT_BITS, event);
+            self.insert_event(event.time_fs >> SLOT_BITS, event);
         }
         self.near.truncate(stay);
     }
 
     /// Into the wheel, or where that does not reach.
-    fn put(&mut self, slot: i64, event: Event) {
+    fn insert_event(&mut self, slot: i64, event: Event) {
         if slot - self.present >= SLOTS as i64 {
             return self.far.push(Reverse(event));
         }
@@ -200,7 +200,7 @@ impl TimeWheel {
                 break;
             }
             let Reverse(event) = self.far.pop().expect("peeked");
-            self.put(slot, event);
+            self.insert_event(slot, event);
         }
     }
 

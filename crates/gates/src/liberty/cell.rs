@@ -51,12 +51,16 @@ impl<'g, 't> Candidate<'g, 't> {
     ///
     /// # Errors
     /// An area that is not a number, and words that mean nothing.
-    pub(super) fn of(group: &'g Group<'t>, file: usize) -> Result<Option<Self>, LibertyError> {
+    pub(super) fn from_group(
+        group: &'g Group<'t>,
+        file: usize,
+    ) -> Result<Option<Self>, LibertyError> {
         let area = group.number("area")?.unwrap_or(0.0);
         let pins = || group.pins();
         let of_direction = |direction: &str| {
-            let of = pins().filter(|(_, pin)| pin.value("direction") == Some(direction));
-            of.map(|(name, _)| name).collect::<Vec<_>>()
+            let pins_of_direction =
+                pins().filter(|(_, pin)| pin.value("direction") == Some(direction));
+            pins_of_direction.map(|(name, _)| name).collect::<Vec<_>>()
         };
         let (mut inputs, outputs) = (of_direction("input"), of_direction("output"));
         // In one order in every drive of a family, whatever the file's is.
@@ -171,7 +175,7 @@ pub(super) struct CellEnergy {
     /// The input that changes, or is behind the output's change; any where the file does not say.
     pub from: Option<usize>,
     /// Of the pin's rise and fall, fJ over the input's slew and the output's load.
-    pub of: [Table; 2],
+    pub tables: [Table; 2],
 }
 
 /// A chosen cell with its tables.
@@ -316,8 +320,8 @@ impl CellModel {
             groups.next().map_or(Ok(Table::fixed(0.0)), read)
         };
         if let (Ok(rise), Ok(fall)) = (table("rise_power"), table("fall_power")) {
-            let of = [rise, fall];
-            self.energies.push(CellEnergy { to, from, of });
+            let tables = [rise, fall];
+            self.energies.push(CellEnergy { to, from, tables });
         } else {
             self.remark(Remark::Energy);
         }

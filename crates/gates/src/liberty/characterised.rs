@@ -46,7 +46,7 @@ impl Environment {
 
 /// A netlist in a library's cells.
 #[derive(Debug, Clone)]
-pub struct Characterised {
+pub struct CharacterisedNetlist {
     /// Delays and limits of every cell; those of cells with delays of their own are the library's, too.
     pub timing: Timing,
     /// Which drive of each stage, by cell.
@@ -59,7 +59,7 @@ pub struct Characterised {
 #[derive(Debug, Clone)]
 struct Block {
     cells: Range<usize>,
-    alone: Arc<(Netlist, Characterised)>,
+    alone: Arc<(Netlist, CharacterisedNetlist)>,
 }
 
 /// What nets do to the cells at them.
@@ -75,7 +75,7 @@ struct Nets {
 
 impl Nets {
     /// Slews at a cell's pins and loads at its outputs.
-    fn at(&self, cell: &FlatCell) -> Conditions {
+    fn conditions(&self, cell: &FlatCell) -> Conditions {
         let load = |net: NetId| self.loads[net.index()];
         let slew = |net: NetId| self.slews[net.index()];
         Conditions {
@@ -91,7 +91,7 @@ impl Liberty {
     /// Delays and limits of every cell of a netlist in this library's cells, by its load and the slews at its pins; cells with delays
     /// of their own keep these, as they are in the typical corner. Inputs have the slew of [`Environment::new`], and wires are left out.
     pub fn timing(&self, netlist: &Netlist) -> Timing {
-        let timing = Characterised::new(netlist, self, &Environment::new(self)).timing;
+        let timing = CharacterisedNetlist::new(netlist, self, &Environment::new(self)).timing;
         timing.with_own_delays(netlist, Corner::Typ, |cell| netlist.cell_path(cell))
     }
 
@@ -123,7 +123,7 @@ impl Liberty {
     }
 }
 
-impl Characterised {
+impl CharacterisedNetlist {
     /// Sizes and times a netlist. Nets without a driver have the environment's slew. A net that the library's strongest buffer is
     /// too weak for loads its driver with no more than that buffer could drive: such nets get trees of buffers in layout, which are no part
     /// of a netlist.
@@ -139,7 +139,8 @@ impl Characterised {
         environment: &Environment,
         is_block: impl Fn(&Module) -> bool,
     ) -> Self {
-        let mut known: HashMap<*const Module, Arc<(Netlist, Characterised)>> = HashMap::new();
+        let mut known: HashMap<*const Module, Arc<(Netlist, CharacterisedNetlist)>> =
+            HashMap::new();
         let mut blocks = Vec::new();
         let mut scope = 1;
         while let Some(at) = netlist.scopes().get(scope) {
@@ -159,7 +160,7 @@ impl Characterised {
             });
             scope += at.subtree;
         }
-        let mut work = Work::new(netlist, &library.map, environment, blocks);
+        let mut work = Characterisation::new(netlist, &library.map, environment, blocks);
         // Stronger drives load what is before them, which may then need to be stronger, too. Three rounds are chosen.
         for _ in 0..3 {
             work.size();
@@ -194,11 +195,15 @@ impl Characterised {
     ) -> [f64; 2] {
         let first = netlist.cells_of(scope).start;
         let cells = first..first + netlist.scopes()[scope].module.total_cells();
-        let of = |net: Option<NetId>| net.map_or(0.0, &changes);
+        let toggles = |net: Option<NetId>| net.map_or(0.0, &changes);
         let each = cells.map(|cell| {
             let (composite, conditions) = self.instance(netlist, &library.map, cell);
             let leaf = &netlist.cells()[cell];
-            composite.energy_fj(&conditions, leaf.inputs.map(of), leaf.outputs.map(of))
+            composite.energy_fj(
+                &conditions,
+                leaf.inputs.map(toggles),
+                leaf.outputs.map(toggles),
+            )
         });
         let sum = each.fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         [sum[0] * 1e-15, sum[1] * volt * volt * 1e-15]
@@ -214,7 +219,7 @@ impl Characterised {
     }
 
     /// The shortest and the longest delay of any instance in `netlist`, fs as its tables give them, each with the library's cells that it is of
-    /// and where they stand. Delays of [`Characterised::timing`] are whole, from 0 to 4.295 us.
+    /// and where they stand. Delays of [`CharacterisedNetlist::timing`] are whole, from 0 to 4.295 us.
     pub fn extreme_delays(&self, netlist: &Netlist, library: &Liberty) -> [(f64, String); 2] {
         let mut extremes = [(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)];
         for (index, cell) in netlist.cells().iter().enumerate() {
@@ -249,7 +254,7 @@ impl Characterised {
                 characterised.instance(alone, map, cell - block.cells.start)
             }
             _ => {
-                let conditions = self.nets.at(&netlist.cells()[cell]);
+                let conditions = self.nets.conditions(&netlist.cells()[cell]);
                 (composite(netlist, map, &self.drives, cell), conditions)
             }
         }
@@ -296,7 +301,7 @@ fn most_load(map: &CellMap, slew_fs: f64) -> f64 {
     low
 }
 
-struct Work<'w> {
+struct Characterisation<'w> {
     netlist: &'w Netlist,
     map: &'w CellMap,
     environment: &'w Environment,
@@ -311,7 +316,7 @@ struct Work<'w> {
     readers: Vec<Vec<u32>>,
 }
 
-impl<'w> Work<'w> {
+impl<'w> Characterisation<'w> {
     fn new(
         netlist: &'w Netlist,
         map: &'w CellMap,
@@ -332,7 +337,7 @@ impl<'w> Work<'w> {
                 readers[net.index()].push(index as u32);
             }
         }
-        Work {
+        Characterisation {
             netlist,
             map,
             environment,
@@ -377,7 +382,7 @@ impl<'w> Work<'w> {
         let mut drives = self.drives.clone();
         for &cell in &self.outside {
             let chosen = &mut drives[cell];
-            let Conditions { loads, .. } = self.nets.at(&self.netlist.cells()[cell]);
+            let Conditions { loads, .. } = self.nets.conditions(&self.netlist.cells()[cell]);
             let recipe = self.composite(cell).recipe;
             // From the outputs back: what a stage drives is known.
             for stage in (0..recipe.stages.len()).rev() {
@@ -412,7 +417,9 @@ impl<'w> Work<'w> {
                 return;
             }
             let leaf = &self.netlist.cells()[cell];
-            let found = self.composite(cell).output_slews(&self.nets.at(leaf));
+            let found = self
+                .composite(cell)
+                .output_slews(&self.nets.conditions(leaf));
             let outputs = leaf.outputs;
             for (net, slew) in outputs.iter().zip(found) {
                 let (Some(net), Some(slew)) = (net, slew) else {
@@ -431,7 +438,7 @@ impl<'w> Work<'w> {
         }
     }
 
-    fn finish(self) -> Characterised {
+    fn finish(self) -> CharacterisedNetlist {
         let mut timing = Timing::of_library(self.netlist, &Library::generic_40nm(), Corner::Typ);
         let mut adopted = HashMap::new();
         for block in &self.blocks {
@@ -441,14 +448,14 @@ impl<'w> Work<'w> {
         }
         for &index in &self.outside {
             let cell = &self.netlist.cells()[index];
-            let (composite, conditions) = (self.composite(index), self.nets.at(cell));
+            let (composite, conditions) = (self.composite(index), self.nets.conditions(cell));
             let (delays, limits) = composite.characterise(cell.kind, &conditions);
             timing.set(index, delays);
             if cell.kind.is_flip_flop() {
                 timing.set_limits(index, limits);
             }
         }
-        Characterised {
+        CharacterisedNetlist {
             timing,
             drives: self.drives,
             nets: self.nets,

@@ -66,15 +66,15 @@ impl<'m> Composite<'m> {
     }
 
     /// Whether a signal within leads to an output or to a stage that does.
-    pub(super) fn is_read(&self, of: Source) -> bool {
+    pub(super) fn is_read(&self, signal: Source) -> bool {
         let outputs = self.recipe.outputs.iter().zip(self.is_connected);
         let stages = self.recipe.stages.iter().enumerate();
         outputs
             .into_iter()
-            .any(|(source, connected)| *source == of && connected)
+            .any(|(source, connected)| *source == signal && connected)
             || stages
                 .into_iter()
-                .any(|(stage, made)| made.sources.contains(&of) && self.is_used(stage))
+                .any(|(stage, made)| made.sources.contains(&signal) && self.is_used(stage))
     }
 
     /// What the cell of a stage is called, of the instance at `path`: without dots, at which some readers of SDF cut names.
@@ -101,11 +101,11 @@ impl<'m> Composite<'m> {
     }
 
     /// Load of this instance's own cells on a signal within it, fF.
-    fn load_at(&self, of: Source) -> ByEdge {
+    fn load_at(&self, signal: Source) -> ByEdge {
         let mut load = [0.0; 2];
         for (stage, made) in self.recipe.stages.iter().enumerate() {
             for (pin, source) in made.sources.iter().enumerate() {
-                if *source == of && self.is_used(stage) {
+                if *source == signal && self.is_used(stage) {
                     let own = self.cell(stage).inputs[pin].load_ff;
                     load = std::array::from_fn(|edge| load[edge] + own[edge]);
                 }
@@ -149,7 +149,9 @@ impl<'m> Composite<'m> {
                         continue;
                     };
                     let effect = arc.effect as usize;
-                    let slew = arc.slew.at(before[arc.cause as usize], load[effect]);
+                    let slew = arc
+                        .slew
+                        .interpolate(before[arc.cause as usize], load[effect]);
                     worst[effect] = Some(worst[effect].map_or(slew, |w: f64| w.max(slew)));
                 }
                 if let [rise, fall] = worst
@@ -176,10 +178,10 @@ impl<'m> Composite<'m> {
         let loads: Vec<ByEdge> = (0..cell.outputs.len())
             .map(|output| self.output_load(stage, output, loads))
             .collect();
-        let slews = cell
-            .arcs
-            .iter()
-            .map(|arc| arc.slew.at(slew, loads[arc.to][arc.effect as usize]));
+        let slews = cell.arcs.iter().map(|arc| {
+            arc.slew
+                .interpolate(slew, loads[arc.to][arc.effect as usize])
+        });
         slews.fold(0.0, f64::max)
     }
 
@@ -204,7 +206,7 @@ impl<'m> Composite<'m> {
                     continue;
                 };
                 let load = self.output_load(stage, arc.to, &conditions.loads)[effect];
-                let time = time + arc.delay.at(slew[cause], load);
+                let time = time + arc.delay.interpolate(slew[cause], load);
                 let worst = &mut times[MAX_INPUTS + 2 * stage + arc.to][effect];
                 *worst = Some(worst.map_or(time, |w: f64| w.max(time)));
             }
@@ -225,7 +227,7 @@ impl<'m> Composite<'m> {
                 continue;
             };
             let load = self.output_load(stage, arc.to, &conditions.loads)[arc.effect as usize];
-            let delay = arc.delay.at(slew[arc.cause as usize], load);
+            let delay = arc.delay.interpolate(slew[arc.cause as usize], load);
             let slowest: &mut f64 = delays
                 .entry((arc.from, arc.to, arc.effect))
                 .or_insert(delay);
@@ -250,7 +252,7 @@ impl<'m> Composite<'m> {
         for stage in self.used() {
             let (cell, sources) = (self.cell(stage), &self.recipe.stages[stage].sources);
             // Changes of a pin, and its slew.
-            let at = |pin: usize, changes: &[f64; PLACES]| {
+            let changes_and_slew = |pin: usize, changes: &[f64; PLACES]| {
                 let place = place(sources[pin]);
                 let slew = place.and_then(|at| slews[at]).unwrap_or_default();
                 (
@@ -261,8 +263,11 @@ impl<'m> Composite<'m> {
             let mean = |to, only: Option<usize>, load, changes: &[f64; PLACES]| {
                 let ours = |e: &&CellEnergy| e.to == to && (only.is_none() || e.from == only);
                 let each = cell.energies.iter().filter(ours).map(|energy| {
-                    let (weight, slew) = at(energy.from.unwrap_or(0), changes);
-                    let [rise, fall] = energy.of.each_ref().map(|table| table.at(slew, load));
+                    let (weight, slew) = changes_and_slew(energy.from.unwrap_or(0), changes);
+                    let [rise, fall] = energy
+                        .tables
+                        .each_ref()
+                        .map(|table| table.interpolate(slew, load));
                     (weight, 0.5 * (rise + fall))
                 });
                 let (mut sum, mut weights, mut plain, mut count) = (0.0, 0.0, 0.0, 0.0);
@@ -287,7 +292,7 @@ impl<'m> Composite<'m> {
                 let pin = pins.find(|((source, connected), _)| **source == from && *connected);
                 let count = match pin {
                     Some((_, count)) => count,
-                    None if sources.len() == 1 => at(0, &changes).0,
+                    None if sources.len() == 1 => changes_and_slew(0, &changes).0,
                     None => shown,
                 };
                 let load = self.output_load(stage, output, &conditions.loads);
@@ -297,7 +302,7 @@ impl<'m> Composite<'m> {
                 changes[MAX_INPUTS + 2 * stage + output] = count;
             }
             for pin in 0..sources.len() {
-                within += at(pin, &changes).0 * mean(None, Some(pin), 0.0, &changes);
+                within += changes_and_slew(pin, &changes).0 * mean(None, Some(pin), 0.0, &changes);
             }
         }
         [within, loads]
@@ -415,12 +420,12 @@ impl<'m> Composite<'m> {
             let apart = late - clock_late;
             let need = match check.kind {
                 CheckKind::Setup | CheckKind::Recovery => {
-                    check.limit.at(clock_slew, own_slew) + apart
+                    check.limit.interpolate(clock_slew, own_slew) + apart
                 }
                 CheckKind::Hold | CheckKind::Removal => {
-                    check.limit.at(clock_slew, own_slew) - apart
+                    check.limit.interpolate(clock_slew, own_slew) - apart
                 }
-                _ => check.limit.at(own_slew, own_slew),
+                _ => check.limit.interpolate(own_slew, own_slew),
             };
             let need = whole_fs(need.max(0.0));
             let controls: &[Control] = match outer {
@@ -436,7 +441,7 @@ impl<'m> Composite<'m> {
             };
             for &control in controls {
                 for &edge in edges {
-                    let known = limits.at(control, check.kind, edge);
+                    let known = limits.limit_fs(control, check.kind, edge);
                     limits.set(control, check.kind, edge, known.max(need));
                 }
             }

@@ -23,7 +23,7 @@ impl TruthTable {
     }
 
     /// A function given by its value for packed inputs.
-    pub(super) fn of(inputs: u32, value: impl Fn(u32) -> bool) -> Self {
+    pub(super) fn from_fn(inputs: u32, value: impl Fn(u32) -> bool) -> Self {
         let bits = (0..1 << inputs).fold(0, |bits, i| bits | u64::from(value(i)) << i);
         TruthTable { inputs, bits }
     }
@@ -31,7 +31,9 @@ impl TruthTable {
     /// The function where an input is 0, and where it is 1.
     pub(crate) fn cofactors(self, input: usize) -> [Self; 2] {
         [0, 1].map(|value| {
-            TruthTable::of(self.inputs, |i| self.at(i & !(1 << input) | value << input))
+            TruthTable::from_fn(self.inputs, |i| {
+                self.value(i & !(1 << input) | value << input)
+            })
         })
     }
 
@@ -39,11 +41,11 @@ impl TruthTable {
     pub(crate) fn constant(self) -> Option<bool> {
         [false, true]
             .into_iter()
-            .find(|&value| self == TruthTable::of(self.inputs, |_| value))
+            .find(|&value| self == TruthTable::from_fn(self.inputs, |_| value))
     }
 
     /// Its value for packed inputs.
-    pub(super) fn at(self, inputs: u32) -> bool {
+    pub(super) fn value(self, inputs: u32) -> bool {
         self.bits >> inputs & 1 == 1
     }
 
@@ -59,7 +61,7 @@ impl TruthTable {
     pub(super) fn unate(self, input: u32) -> (bool, bool) {
         let mut can = (false, false);
         for low in (0..1 << self.inputs).filter(|i| i >> input & 1 == 0) {
-            let (before, after) = (self.at(low), self.at(low | 1 << input));
+            let (before, after) = (self.value(low), self.value(low | 1 << input));
             can.0 |= !before && after;
             can.1 |= before && !after;
         }
@@ -69,7 +71,7 @@ impl TruthTable {
     /// The function as one of `names`, if it is nothing but that input: its index, and whether it is inverted.
     pub(crate) fn literal(self) -> Option<(usize, bool)> {
         (0..self.inputs as usize).find_map(|input| {
-            let same = TruthTable::of(self.inputs, |i| i >> input & 1 == 1);
+            let same = TruthTable::from_fn(self.inputs, |i| i >> input & 1 == 1);
             let mask = Self::mask(self.inputs);
             match self.bits {
                 bits if bits == same.bits => Some((input, false)),
@@ -194,7 +196,7 @@ impl Parser<'_> {
 
     fn input(&self, name: &str) -> Option<u64> {
         let input = self.names.iter().position(|known| *known == name)?;
-        Some(TruthTable::of(self.inputs, |i| i >> input & 1 == 1).bits)
+        Some(TruthTable::from_fn(self.inputs, |i| i >> input & 1 == 1).bits)
     }
 }
 
@@ -209,18 +211,21 @@ mod tests {
     #[test]
     fn operators_bind_as_liberty_says() {
         let table = |text| truth_table(text, &["A", "B", "S"]).unwrap();
-        let of = |value: fn(bool, bool, bool) -> bool| {
-            TruthTable::of(3, |i| value(i & 1 == 1, i & 2 != 0, i & 4 != 0))
+        let expected = |value: fn(bool, bool, bool) -> bool| {
+            TruthTable::from_fn(3, |i| value(i & 1 == 1, i & 2 != 0, i & 4 != 0))
         };
-        assert_eq!(table("(A*B)+(!S)"), of(|a, b, s| a & b | !s));
-        assert_eq!(table("A & !S | B S"), of(|a, b, s| a & !s | b & s));
-        assert_eq!(table("A' + B ^ S A"), of(|a, b, s| !a | (b ^ (s & a))));
-        assert_eq!(table("(!(S))"), of(|_, _, s| !s));
-        assert_eq!(table("1"), of(|_, _, _| true));
-        assert_eq!(table("0"), of(|_, _, _| false));
-        assert_eq!(table("A 0 + B"), of(|_, b, _| b));
+        assert_eq!(table("(A*B)+(!S)"), expected(|a, b, s| a & b | !s));
+        assert_eq!(table("A & !S | B S"), expected(|a, b, s| a & !s | b & s));
+        assert_eq!(
+            table("A' + B ^ S A"),
+            expected(|a, b, s| !a | (b ^ (s & a)))
+        );
+        assert_eq!(table("(!(S))"), expected(|_, _, s| !s));
+        assert_eq!(table("1"), expected(|_, _, _| true));
+        assert_eq!(table("0"), expected(|_, _, _| false));
+        assert_eq!(table("A 0 + B"), expected(|_, b, _| b));
         let quoted = truth_table(r#"\"1\" !\"B 2\" S"#, &["1", "B 2", "S"]);
-        assert_eq!(quoted, Some(of(|a, b, s| a & !b & s)));
+        assert_eq!(quoted, Some(expected(|a, b, s| a & !b & s)));
         // As many inputs as a table has.
         let names = ["A", "B", "C", "D", "E", "F", "G"];
         let tables = [6, 7].map(|n| truth_table("A", &names[..n]).is_some());

@@ -33,7 +33,7 @@ impl<'g, 't> LibraryFile<'g, 't> {
         Ok(LibraryFile {
             name,
             group,
-            templates: Templates::of(group),
+            templates: Templates::from_library(group),
             units: Units::read(group)?,
         })
     }

@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn states_are_averaged_and_supplies_added_up() {
-        let of = |cell: &str| {
+        let cell_leakage = |cell: &str| {
             let text = format!(
                 "library (l) {{ default_cell_leakage_power : 7;\n cell (c) {{ {cell} }} }}"
             );
@@ -97,10 +97,12 @@ mod tests {
             ),
             (String::new(), 7.0),
         ] {
-            assert_eq!(of(&cell), Ok(Some(expected)), "{cell}");
+            assert_eq!(cell_leakage(&cell), Ok(Some(expected)), "{cell}");
         }
         assert_eq!(
-            of("leakage_power () { when : \"A\"; }").unwrap_err().line,
+            cell_leakage("leakage_power () { when : \"A\"; }")
+                .unwrap_err()
+                .line,
             2
         );
         for default in ["", "default_cell_leakage_power : 0;"] {

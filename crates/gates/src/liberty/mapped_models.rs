@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
 use super::cell::{CellModel, FlipFlop, Role};
-use super::characterised::Characterised;
+use super::characterised::CharacterisedNetlist;
 use super::function::TruthTable;
 use super::read::Liberty;
 use super::verilog_name::in_verilog;
@@ -27,7 +27,7 @@ pub fn write_mapped_cells(
     out: &mut dyn Write,
     netlist: &Netlist,
     library: &Liberty,
-    characterised: &Characterised,
+    characterised: &CharacterisedNetlist,
 ) -> io::Result<()> {
     let mut models = BTreeMap::new();
     for index in 0..netlist.cells().len() {
@@ -100,7 +100,7 @@ fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io:
         };
         let values: BTreeSet<bool> = (0..1 << function.inputs)
             .filter(fits)
-            .map(|packed| function.at(packed))
+            .map(|packed| function.value(packed))
             .collect();
         if let (1, Some(&value)) = (values.len(), values.first()) {
             let levels = (0..function.inputs).map(|pin| ["0 ", "1 ", "x "][level(pin) as usize]);

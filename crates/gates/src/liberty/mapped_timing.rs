@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 
-use super::characterised::{Characterised, Environment};
+use super::characterised::{CharacterisedNetlist, Environment};
 use super::mapped_wires::write_wires;
 use super::mapping::Source;
 use super::read::Liberty;
@@ -19,7 +19,7 @@ pub fn write_mapped_sdf(
     out: &mut dyn Write,
     netlist: &Netlist,
     library: &Liberty,
-    characterised: &Characterised,
+    characterised: &CharacterisedNetlist,
 ) -> io::Result<()> {
     let top = netlist.scopes()[0].module.name();
     writeln!(
@@ -80,7 +80,7 @@ pub fn write_constraints(
     out: &mut dyn Write,
     netlist: &Netlist,
     library: &Liberty,
-    (characterised, environment): (&Characterised, &Environment),
+    (characterised, environment): (&CharacterisedNetlist, &Environment),
     clocking: Clocking<'_>,
 ) -> io::Result<()> {
     let Clocking { port, period, .. } = clocking;

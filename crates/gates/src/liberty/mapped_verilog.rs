@@ -5,7 +5,7 @@
 
 use std::io::{self, Write};
 
-use super::characterised::Characterised;
+use super::characterised::CharacterisedNetlist;
 use super::mapping::Source;
 use super::read::Liberty;
 use super::verilog_name::in_verilog;
@@ -17,7 +17,7 @@ const HEAD: &str = "\
 /* verilator lint_off DECLFILENAME */
 ";
 
-/// Writes a netlist in the cells and drives that [`Characterised::new`] chose, as a module of its top's name.
+/// Writes a netlist in the cells and drives that [`CharacterisedNetlist::new`] chose, as a module of its top's name.
 ///
 /// # Errors
 /// Those of the writer.
@@ -25,7 +25,7 @@ pub fn write_mapped(
     out: &mut dyn Write,
     netlist: &Netlist,
     library: &Liberty,
-    characterised: &Characterised,
+    characterised: &CharacterisedNetlist,
 ) -> io::Result<()> {
     let top = &netlist.scopes()[0];
     let names = names(netlist);

@@ -208,7 +208,7 @@ impl<'g, 't> Maker<'g, 't> {
             Nand2 | Nor2 | And2 | Or2 => {
                 // A NOR's inputs and output inverted, and so on.
                 let inverters = vec![self.inverter(Input(0)), self.inverter(Input(1))];
-                let dual = TruthTable::of(2, |inputs| function.at(!inputs & 0b11));
+                let dual = TruthTable::from_fn(2, |inputs| function.value(!inputs & 0b11));
                 let of_inverses = |function| self.family(function, None, &[Of(0, 0), Of(1, 0)]);
                 let stages = match of_inverses(dual) {
                     Some(stage) => vec![Some(stage)],
@@ -329,7 +329,7 @@ fn gate_function(kind: CellKind) -> TruthTable {
         1 => Logic::One,
         _ => Logic::Zero,
     };
-    TruthTable::of(kind.inputs().len() as u32, |inputs| {
+    TruthTable::from_fn(kind.inputs().len() as u32, |inputs| {
         kind.output(std::array::from_fn(|pin| level(inputs, pin))) == Logic::One
     })
 }
@@ -353,12 +353,12 @@ fn order(own: TruthTable, wanted: TruthTable) -> Option<Vec<usize>> {
         _ => return None,
     };
     let fits = |order: &&&[usize]| {
-        TruthTable::of(own.inputs, |inputs| {
+        TruthTable::from_fn(own.inputs, |inputs| {
             let packed = order
                 .iter()
                 .enumerate()
                 .map(|(pin, &input)| (inputs >> input & 1) << pin);
-            own.at(packed.sum())
+            own.value(packed.sum())
         }) == wanted
     };
     orders.iter().find(fits).map(|order| order.to_vec())

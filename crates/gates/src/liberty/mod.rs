@@ -58,7 +58,7 @@ mod units;
 mod verilog_name;
 
 pub(crate) use cell::{CellFunction, Role};
-pub use characterised::{Characterised, Environment};
+pub use characterised::{CharacterisedNetlist, Environment};
 pub use error::{KitError, LibertyError};
 pub(crate) use function::TruthTable;
 pub use mapped_models::write_mapped_cells;

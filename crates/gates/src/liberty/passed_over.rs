@@ -31,7 +31,7 @@ pub struct PassedOver {
 
 impl PassedOver {
     /// A cell that is no candidate, or a gate that the library says not to use and that is not `wanted` by name.
-    pub(super) fn of(
+    pub(super) fn from_group(
         file: &LibraryFile<'_, '_>,
         group: &Group<'_>,
         candidate: Option<&Candidate<'_, '_>>,
@@ -48,7 +48,7 @@ impl PassedOver {
     }
 
     /// A cell whose name another one in an earlier line of the file has.
-    pub(super) fn again(file: &LibraryFile<'_, '_>, group: &Group<'_>, line: usize) -> Self {
+    pub(super) fn duplicate(file: &LibraryFile<'_, '_>, group: &Group<'_>, line: usize) -> Self {
         let why = format!("line {line} has a cell of this name, which counts");
         Self::new(file, group, why)
     }

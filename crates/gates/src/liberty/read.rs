@@ -70,12 +70,17 @@ impl Liberty {
             let mut lines = HashMap::new();
             for cell in file.group.of_kind("cell") {
                 if let Some(&before) = lines.get(cell.name()) {
-                    passed_over.push(PassedOver::again(file, cell, before));
+                    passed_over.push(PassedOver::duplicate(file, cell, before));
                     continue;
                 }
                 lines.insert(cell.name(), cell.line);
-                let candidate = Candidate::of(cell, index).map_err(in_file(index))?;
-                passed_over.extend(PassedOver::of(file, cell, candidate.as_ref(), wanted));
+                let candidate = Candidate::from_group(cell, index).map_err(in_file(index))?;
+                passed_over.extend(PassedOver::from_group(
+                    file,
+                    cell,
+                    candidate.as_ref(),
+                    wanted,
+                ));
                 candidates.extend(candidate);
             }
         }

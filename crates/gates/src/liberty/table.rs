@@ -54,7 +54,7 @@ impl Table {
     }
 
     /// The value, fs: `related` is the slew of the input or the clock, fs; `other` the load, fF, or the data's slew, fs.
-    pub(super) fn at(&self, related: f64, other: f64) -> f64 {
+    pub(super) fn interpolate(&self, related: f64, other: f64) -> f64 {
         let (row, along_row) = place(&self.related, related);
         let (col, along_col) = place(&self.other, other);
         let cols = self.other.len().max(1);
@@ -87,7 +87,7 @@ fn place(axis: &[f64], x: f64) -> (usize, f64) {
 pub(super) struct Templates<'g, 't>(HashMap<&'t str, &'g Group<'t>>);
 
 impl<'g, 't> Templates<'g, 't> {
-    pub(super) fn of(library: &'g Group<'t>) -> Self {
+    pub(super) fn from_library(library: &'g Group<'t>) -> Self {
         let kinds = ["lu_table_template", "power_lut_template"];
         let templates = kinds.into_iter().flat_map(|kind| library.of_kind(kind));
         Templates(
@@ -212,19 +212,23 @@ mod tests {
             "library (l) {{ lu_table_template (t) {{ variable_1 : total_output_net_capacitance; variable_2 : input_net_transition; index_1 (\"1, 3\"); index_2 (\"0, 10\"); }}\n lu_table_template (c) {{ variable_1 : input_voltage; }}\n lu_table_template (d) {{ variable_1 : input_net_transition; variable_3 : related_out_total_output_net_capacitance; }}\n {text} }}"
         );
         let library = read(&text).unwrap();
-        Templates::of(&library).table(&library.groups[3], UNITS)
+        Templates::from_library(&library).table(&library.groups[3], UNITS)
     }
 
     #[test]
     fn values_between_and_beyond_the_marks_are_on_straight_lines() {
         let delay = table("cell_rise (t) { values (\"1, 2\", \"3, 6\"); }").unwrap();
-        let at = |slew_ns: f64, load_pf: f64| delay.at(slew_ns * 1e6, load_pf * 1e3) / 1e6;
-        assert_eq!((at(0.0, 1.0), at(10.0, 1.0), at(0.0, 3.0)), (1.0, 2.0, 3.0));
-        assert_eq!(at(5.0, 2.0), 3.0);
-        assert_eq!(at(0.0, 5.0), 5.0);
-        assert_eq!(at(-10.0, 1.0), 0.0);
+        let delay_ns =
+            |slew_ns: f64, load_pf: f64| delay.interpolate(slew_ns * 1e6, load_pf * 1e3) / 1e6;
+        assert_eq!(
+            (delay_ns(0.0, 1.0), delay_ns(10.0, 1.0), delay_ns(0.0, 3.0)),
+            (1.0, 2.0, 3.0)
+        );
+        assert_eq!(delay_ns(5.0, 2.0), 3.0);
+        assert_eq!(delay_ns(0.0, 5.0), 5.0);
+        assert_eq!(delay_ns(-10.0, 1.0), 0.0);
         let one = table("cell_rise (scalar) { values (\"7\"); }").unwrap();
-        assert_eq!(one.at(3.0, 4.0), 7e6);
+        assert_eq!(one.interpolate(3.0, 4.0), 7e6);
     }
 
     #[test]

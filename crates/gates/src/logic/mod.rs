@@ -47,7 +47,7 @@ impl Logic {
 
     /// What a gate input makes of this value: Z reads as X.
     #[inline]
-    pub const fn seen(self) -> Logic {
+    pub const fn as_gate_input(self) -> Logic {
         match self {
             Z => X,
             v => v,
@@ -65,7 +65,7 @@ impl Logic {
 
     /// Logical and.
     pub const fn and(self, other: Logic) -> Logic {
-        match (self.seen(), other.seen()) {
+        match (self.as_gate_input(), other.as_gate_input()) {
             (Zero, _) | (_, Zero) => Zero,
             (One, One) => One,
             _ => X,
@@ -74,7 +74,7 @@ impl Logic {
 
     /// Logical or.
     pub const fn or(self, other: Logic) -> Logic {
-        match (self.seen(), other.seen()) {
+        match (self.as_gate_input(), other.as_gate_input()) {
             (One, _) | (_, One) => One,
             (Zero, Zero) => Zero,
             _ => X,
@@ -83,7 +83,7 @@ impl Logic {
 
     /// Exclusive or.
     pub const fn xor(self, other: Logic) -> Logic {
-        match (self.seen(), other.seen()) {
+        match (self.as_gate_input(), other.as_gate_input()) {
             (X, _) | (_, X) => X,
             (Zero, One) | (One, Zero) => One,
             _ => Zero,
@@ -92,7 +92,7 @@ impl Logic {
 
     /// Complement.
     pub const fn inverted(self) -> Logic {
-        match self.seen() {
+        match self.as_gate_input() {
             Zero => One,
             One => Zero,
             _ => X,
@@ -102,7 +102,7 @@ impl Logic {
     /// 2:1 multiplexer: `a` when `select` is 0, `b` when it is 1. An unknown select passes a value
     /// only where both inputs agree on it.
     pub const fn mux(a: Logic, b: Logic, select: Logic) -> Logic {
-        match (select.seen(), a.seen(), b.seen()) {
+        match (select.as_gate_input(), a.as_gate_input(), b.as_gate_input()) {
             (Zero, a, _) => a,
             (One, _, b) => b,
             (_, Zero, Zero) => Zero,

@@ -344,7 +344,7 @@ impl ModuleBuilder {
         match self.error {
             Some(error) => Err(error),
             None => {
-                self.module.names = Names::of(&self.module);
+                self.module.names = Names::new(&self.module);
                 Ok(Arc::new(self.module))
             }
         }

@@ -125,7 +125,7 @@ impl CellKind {
         let [a, b, s, _] = inputs;
         match self {
             Inv => a.inverted(),
-            Buf => a.seen(),
+            Buf => a.as_gate_input(),
             Nand2 => a.and(b).inverted(),
             Nor2 => a.or(b).inverted(),
             And2 => a.and(b),
@@ -150,18 +150,18 @@ pub(crate) const fn next_state(
     reset: Logic,
     set: Logic,
 ) -> Logic {
-    let data = data.seen();
-    let clocked = match (clock_before.seen(), clock.seen()) {
+    let data = data.as_gate_input();
+    let clocked = match (clock_before.as_gate_input(), clock.as_gate_input()) {
         (Logic::Zero, Logic::One) => data,
         (Logic::Zero, Logic::X) | (Logic::X, Logic::One) => agreed(state, data),
         _ => state,
     };
-    let after_set = match set.seen() {
+    let after_set = match set.as_gate_input() {
         Logic::Zero => clocked,
         Logic::One => Logic::One,
         _ => agreed(clocked, Logic::One),
     };
-    match reset.seen() {
+    match reset.as_gate_input() {
         Logic::Zero => after_set,
         Logic::One => Logic::Zero,
         _ => agreed(after_set, Logic::Zero),

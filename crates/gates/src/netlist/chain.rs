@@ -33,7 +33,7 @@ pub struct Chain {
 
 impl Chain {
     /// The chain that a cell is; none where it delays as gates do.
-    pub(crate) fn of(kind: CellKind, own: Option<OwnDelay>) -> Option<Self> {
+    pub(crate) fn from_delay(kind: CellKind, own: Option<OwnDelay>) -> Option<Self> {
         let own = own.filter(|own| own.model == DelayModel::Transport)?;
         debug_assert_eq!(kind, CellKind::Buf, "only wires have transport delays");
         let sigma = own.spread.map_or(0.0, |spread| spread.sigma);
@@ -48,13 +48,13 @@ impl Chain {
     pub(crate) fn of_cell(netlist: &Netlist, cell: usize) -> Option<Self> {
         let own = netlist.own_delays();
         let at = own.binary_search_by_key(&cell, |own| own.0).ok()?;
-        Chain::of(netlist.cells()[cell].kind, Some(own[at].1))
+        Chain::from_delay(netlist.cells()[cell].kind, Some(own[at].1))
     }
 
     /// The kinds of chain in a netlist.
     pub fn all(netlist: &Netlist) -> BTreeSet<Self> {
         let own = netlist.own_delays().iter();
-        own.filter_map(|&(cell, own)| Chain::of(netlist.cells()[cell].kind, Some(own)))
+        own.filter_map(|&(cell, own)| Chain::from_delay(netlist.cells()[cell].kind, Some(own)))
             .collect()
     }
 
@@ -98,8 +98,9 @@ mod tests {
     /// Chains of other delays or stages are other modules.
     #[test]
     fn modules_are_named_after_delay_and_stages() {
-        let chain =
-            |typical_fs| Chain::of(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap();
+        let chain = |typical_fs| {
+            Chain::from_delay(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap()
+        };
         let (short, long) = (chain(50_000), chain(120_000));
         assert_eq!(
             (short.stages, short.module()),
@@ -115,7 +116,7 @@ mod tests {
     proptest! {
         #[test]
         fn stages_are_alike_and_add_up(fs: u32, typical_fs in 1u32..10_000_000) {
-            let chain = Chain::of(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap();
+            let chain = Chain::from_delay(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap();
             let parts: Vec<u32> = chain.parts(fs).collect();
             prop_assert_eq!(parts.len(), chain.stages);
             prop_assert_eq!(parts.iter().map(|&fs| u64::from(fs)).sum::<u64>(), u64::from(fs));

@@ -43,7 +43,7 @@ impl DataLimit {
     }
 
     /// The limit of one direction.
-    pub const fn of(self, edge: Edge) -> Delay {
+    pub const fn for_edge(self, edge: Edge) -> Delay {
         match edge {
             Edge::Rise => self.rise,
             Edge::Fall => self.fall,
@@ -133,7 +133,7 @@ impl CheckKind {
 
 impl CheckLimits {
     /// The library's limits of one cell (all zero for gates).
-    pub const fn of(kind: CellKind) -> Self {
+    pub const fn for_cell(kind: CellKind) -> Self {
         match kind {
             CellKind::Dffr => CheckLimits {
                 setup: DataLimit::scaled(31_019, 35_023),
@@ -188,23 +188,23 @@ impl CheckLimits {
 
     /// The limit of one check in one corner, fs; that of setup and hold for D changing in the direction of `edge`,
     /// which the other checks ignore.
-    pub const fn toward(&self, check: CheckKind, edge: Edge, corner: Corner) -> u32 {
+    pub const fn edge_limit_fs(&self, check: CheckKind, edge: Edge, corner: Corner) -> u32 {
         let limit = match check {
-            CheckKind::Setup => self.setup.of(edge),
-            CheckKind::Hold => self.hold.of(edge),
+            CheckKind::Setup => self.setup.for_edge(edge),
+            CheckKind::Hold => self.hold.for_edge(edge),
             CheckKind::Recovery => self.recovery,
             CheckKind::Removal => self.removal,
             CheckKind::ClockHigh => self.clock_high,
             CheckKind::ClockLow => self.clock_low,
             CheckKind::ControlHigh => self.control_high,
         };
-        limit.at(corner)
+        limit.in_corner_fs(corner)
     }
 
     /// The limit of one check in one corner, fs; the larger one where D's directions differ.
-    pub const fn at(&self, check: CheckKind, corner: Corner) -> u32 {
-        let rise = self.toward(check, Edge::Rise, corner);
-        let fall = self.toward(check, Edge::Fall, corner);
+    pub const fn limit_fs(&self, check: CheckKind, corner: Corner) -> u32 {
+        let rise = self.edge_limit_fs(check, Edge::Rise, corner);
+        let fall = self.edge_limit_fs(check, Edge::Fall, corner);
         if rise > fall { rise } else { fall }
     }
 }
@@ -219,7 +219,8 @@ mod tests {
     fn limits_are_ordered_by_corner_and_gates_have_none() {
         for kind in CellKind::ALL {
             for check in CheckKind::ALL {
-                let [min, typ, max] = Corner::ALL.map(|c| CheckLimits::of(kind).at(check, c));
+                let [min, typ, max] =
+                    Corner::ALL.map(|c| CheckLimits::for_cell(kind).limit_fs(check, c));
                 assert!(min <= typ && typ <= max);
                 assert_eq!(typ != 0, kind.is_flip_flop());
             }
@@ -231,10 +232,10 @@ mod tests {
         for kind in CellKind::ALL {
             for check in CheckKind::ALL {
                 for corner in Corner::ALL {
-                    let limits = CheckLimits::of(kind);
-                    let either =
-                        [Edge::Rise, Edge::Fall].map(|edge| limits.toward(check, edge, corner));
-                    assert_eq!(Some(&limits.at(check, corner)), either.iter().max());
+                    let limits = CheckLimits::for_cell(kind);
+                    let either = [Edge::Rise, Edge::Fall]
+                        .map(|edge| limits.edge_limit_fs(check, edge, corner));
+                    assert_eq!(Some(&limits.limit_fs(check, corner)), either.iter().max());
                 }
             }
         }
@@ -247,7 +248,7 @@ mod tests {
         for kind in CellKind::ALL.into_iter().filter(|k| k.is_flip_flop()) {
             for corner in Corner::ALL {
                 let clock_to_q = library.delay(kind, 1, Logic::One, corner).as_fs();
-                let hold = library.checks(kind).at(CheckKind::Hold, corner);
+                let hold = library.checks(kind).limit_fs(CheckKind::Hold, corner);
                 assert!(i64::from(hold) < clock_to_q);
             }
         }

@@ -89,7 +89,7 @@ impl Delay {
     }
 
     /// The delay of one corner, fs.
-    pub const fn at(self, corner: Corner) -> u32 {
+    pub const fn in_corner_fs(self, corner: Corner) -> u32 {
         match corner {
             Corner::Fast => self.min_fs,
             Corner::Typ => self.typ_fs,
@@ -115,7 +115,7 @@ impl Edge {
     pub const BOTH: [Edge; 2] = [Edge::Rise, Edge::Fall];
 
     /// The direction of a change to `value`, if it is to a known level.
-    pub fn to(value: Logic) -> Option<Self> {
+    pub fn from_final_value(value: Logic) -> Option<Self> {
         match value {
             Logic::One => Some(Edge::Rise),
             Logic::Zero => Some(Edge::Fall),
@@ -151,8 +151,11 @@ mod tests {
             max_fs: 1001,
         };
         let scaled = delay.times(1.5);
-        assert_eq!(Corner::ALL.map(|corner| scaled.at(corner)), [5, 150, 1502]);
-        let [min, typ, max] = Corner::ALL.map(|corner| Delay::scaled(1000).at(corner));
+        assert_eq!(
+            Corner::ALL.map(|corner| scaled.in_corner_fs(corner)),
+            [5, 150, 1502]
+        );
+        let [min, typ, max] = Corner::ALL.map(|corner| Delay::scaled(1000).in_corner_fs(corner));
         assert_eq!([min, typ, max], [720, 1000, 1450]);
     }
 }

@@ -26,7 +26,7 @@ pub struct ArcDelay {
 impl ArcDelay {
     /// Delay of an output change to `to`, fs; a change to X takes the shorter one.
     #[inline]
-    pub fn to(self, to: Logic) -> u32 {
+    pub fn delay_fs(self, to: Logic) -> u32 {
         match to {
             Logic::One => self.rise_fs,
             Logic::Zero => self.fall_fs,

@@ -35,16 +35,16 @@ impl InstanceLimits {
 
     /// Limits of one flip-flop as those of its kind, the same in every corner; of set and reset the larger.
     pub(crate) fn of_kind(&self) -> CheckLimits {
-        let of = |check, edge| {
+        let larger_limit = |check, edge| {
             let controls = [Control::Reset, Control::Set];
-            let limits = controls.map(|control| self.at(control, check, edge));
+            let limits = controls.map(|control| self.limit_fs(control, check, edge));
             Delay::fixed(limits[0].max(limits[1]))
         };
         let data = |check| DataLimit {
-            rise: of(check, Edge::Rise),
-            fall: of(check, Edge::Fall),
+            rise: larger_limit(check, Edge::Rise),
+            fall: larger_limit(check, Edge::Fall),
         };
-        let either = |check| of(check, Edge::Rise);
+        let either = |check| larger_limit(check, Edge::Rise);
         CheckLimits {
             setup: data(CheckKind::Setup),
             hold: data(CheckKind::Hold),
@@ -57,14 +57,14 @@ impl InstanceLimits {
     }
 
     /// What the library says in one corner.
-    pub(crate) fn of(limits: &CheckLimits, corner: Corner) -> Self {
-        let by_edge = |check| Edge::BOTH.map(|edge| limits.toward(check, edge, corner));
+    pub(crate) fn from_library(limits: &CheckLimits, corner: Corner) -> Self {
+        let by_edge = |check| Edge::BOTH.map(|edge| limits.edge_limit_fs(check, edge, corner));
         InstanceLimits([CheckKind::ALL.map(by_edge); 2])
     }
 
     /// One limit, fs.
     #[inline]
-    pub const fn at(&self, control: Control, check: CheckKind, edge: Edge) -> u32 {
+    pub const fn limit_fs(&self, control: Control, check: CheckKind, edge: Edge) -> u32 {
         self.0[control as usize][check as usize][edge as usize]
     }
 

@@ -46,7 +46,10 @@ impl TimingArc {
     /// Delay of an output change to `to` in one corner, fs. A change to X takes the shorter of the
     /// two, as in IEEE 1364 for gates without a third delay.
     pub fn delay_fs(self, corner: Corner, to: Logic) -> u32 {
-        let (rise, fall) = (self.rise.at(corner), self.fall.at(corner));
+        let (rise, fall) = (
+            self.rise.in_corner_fs(corner),
+            self.fall.in_corner_fs(corner),
+        );
         match to {
             Logic::One => rise,
             Logic::Zero => fall,
@@ -100,7 +103,7 @@ impl Library {
                 [NONE, SLOWER_CLOCK, SLOWER_CLEAR, SLOWER_CLEAR]
             }
         });
-        let checks = CellKind::ALL.map(CheckLimits::of);
+        let checks = CellKind::ALL.map(CheckLimits::for_cell);
         Library { cells, checks }
     }
 
@@ -112,8 +115,8 @@ impl Library {
     /// Delays of one cell in a corner.
     pub(crate) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
         let arc = |arc: TimingArc| ArcDelay {
-            rise_fs: arc.rise.at(corner),
-            fall_fs: arc.fall.at(corner),
+            rise_fs: arc.rise.in_corner_fs(corner),
+            fall_fs: arc.fall.in_corner_fs(corner),
         };
         self.arcs(kind).map(|outputs| outputs.map(arc))
     }

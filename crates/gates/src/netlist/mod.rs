@@ -44,6 +44,6 @@ pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
 pub use own_delay::OwnDelay;
 pub use requirements::{Requirement, Requirements};
 pub use static_timing::caused;
-pub use static_timing::{Arrivals, Bound, Path, StaticTiming, Step, TimingLoop};
+pub use static_timing::{Arrivals, Bound, Path, PathStep, StaticTiming, TimingLoop};
 pub use timing::Timing;
 pub use variation::{Conditions, derated_limits, varied, varied_as};

@@ -122,7 +122,7 @@ impl Module {
 
 impl Names {
     /// The names of a complete module.
-    pub(crate) fn of(module: &Module) -> Self {
+    pub(crate) fn new(module: &Module) -> Self {
         let index = |i: usize| i as u32;
         let mut scopes = 1;
         let mut instances = HashMap::with_capacity(module.instances.len());
@@ -238,11 +238,11 @@ mod tests {
         let q = m.wire("q");
         m.cell("ff", CellKind::Dffr, &[z, a, a], &[Some(q), None]);
         let leaf = m.finish().expect("a leaf");
-        let of = |area: fn(CellKind) -> u32| {
+        let areas = |area: fn(CellKind) -> u32| {
             [CellKind::Inv, CellKind::Dffr, CellKind::Xor2].map(|kind| u64::from(area(kind)))
         };
         let ([inv, ff, xor], [inv_fets, ff_fets, xor_fets]) =
-            (of(CellKind::area), of(CellKind::transistors));
+            (areas(CellKind::area), areas(CellKind::transistors));
         assert_eq!(
             (leaf.area(), leaf.transistors()),
             (inv + ff, inv_fets + ff_fets)

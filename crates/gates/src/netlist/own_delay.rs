@@ -48,7 +48,7 @@ impl OwnDelay {
         // A spread is that of the element, whatever it is made of: of an inverter's size in the law of areas.
         let own = self.spread.map_or(1.0, |spread| spread.factor(&path(), 2));
         let typical_fs = (f64::from(self.typical_fs) * own).round() as u32;
-        let fs = Delay::scaled(typical_fs).at(corner);
+        let fs = Delay::scaled(typical_fs).in_corner_fs(corner);
         let arc = ArcDelay {
             rise_fs: fs,
             fall_fs: fs,

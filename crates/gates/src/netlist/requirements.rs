@@ -95,7 +95,7 @@ impl<'n> Requirements<'n> {
     ///
     /// # Errors
     /// When edges come back to where they were without meeting a barrier.
-    pub fn of(
+    pub fn new(
         netlist: &'n Netlist,
         analysis: &StaticTiming<'n>,
         clock: NetId,
@@ -130,7 +130,7 @@ impl<'n> Requirements<'n> {
 
     fn add(&mut self, cell: usize, kind: CellKind, library: &Library, corner: Corner) {
         let limits = library.checks(kind);
-        let limit = |check, edge| Time::from_fs(limits.toward(check, edge, corner).into());
+        let limit = |check, edge| Time::from_fs(limits.edge_limit_fs(check, edge, corner).into());
         let leaf = &self.netlist.cells()[cell];
         let (data, clock) = (leaf.input(0), leaf.input(1));
         for launch in Edge::BOTH {
@@ -252,7 +252,7 @@ mod tests {
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();
         let found =
-            Requirements::of(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
+            Requirements::new(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
         let second =
             |r: &&Requirement| netlist.cell_path(r.cell) == "pair.second" && r.kind == kind;
         let worst = found.all().iter().filter(second).max_by_key(|r| r.need);
@@ -270,7 +270,8 @@ mod tests {
             delay(CellKind::Inv, 0, Logic::Zero),
         );
         let limits = library.checks(CellKind::Dffr);
-        let limit = |kind, edge| Time::from_fs(limits.toward(kind, edge, Corner::Typ).into());
+        let limit =
+            |kind, edge| Time::from_fs(limits.edge_limit_fs(kind, edge, Corner::Typ).into());
         let setup = (rise + limit(CheckKind::Setup, Edge::Rise))
             .max(fall + limit(CheckKind::Setup, Edge::Fall));
         assert_eq!(need(false, CheckKind::Setup), (2, clock_to_q + setup));
@@ -297,13 +298,14 @@ mod tests {
         let analysis = StaticTiming::new(&netlist, &timing);
         let clock = netlist.net("CK").unwrap();
         let found =
-            Requirements::of(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
+            Requirements::new(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
         for edge in Edge::BOTH {
             let is_its = |r: &&Requirement| r.kind == CheckKind::Hold && r.edge == edge;
             let need = found.all().iter().find(is_its).unwrap().need;
-            let limit = library
-                .checks(CellKind::Dffr)
-                .toward(CheckKind::Hold, edge, Corner::Typ);
+            let limit =
+                library
+                    .checks(CellKind::Dffr)
+                    .edge_limit_fs(CheckKind::Hold, edge, Corner::Typ);
             let arc = library.arcs(CellKind::Dffr)[1][1];
             let to_qn = arc.delay_fs(Corner::Typ, edge.level());
             assert_eq!(

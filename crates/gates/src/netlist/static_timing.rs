@@ -213,12 +213,12 @@ impl<'n> StaticTiming<'n> {
             for arc in arcs(from) {
                 let (cell, pin) = (arc.cell, arc.pin);
                 let level = edge_of(arc.to).level();
-                let delays = self.timing.of(cell);
-                let own = delays[pin][arc.output].to(level);
+                let delays = self.timing.cell_delays(cell);
+                let own = delays[pin][arc.output].delay_fs(level);
                 let leaf = &self.netlist.cells()[cell];
                 let quickest = (0..leaf.kind.inputs().len())
                     .filter(|&other| leaf.kind.triggers(other) && can_change(leaf.input(other)))
-                    .map(|other| delays[other][arc.output].to(level))
+                    .map(|other| delays[other][arc.output].delay_fs(level))
                     .fold(own, u32::min);
                 let arrival = |time_fs| Arrival {
                     time_fs,
@@ -288,7 +288,7 @@ impl Arrivals<'_> {
         let leaf = &self.netlist.cells()[cell];
         let [data, ..] = leaf.inputs;
         let output = leaf.outputs.iter().position(|&net| net == data)?;
-        let delay = self.timing.of(cell)[CLOCK][output].to(edge.level());
+        let delay = self.timing.cell_delays(cell)[CLOCK][output].delay_fs(edge.level());
         Some(Time::from_fs(delay.into()))
     }
 
@@ -321,7 +321,7 @@ impl Arrivals<'_> {
                 let path = self.netlist.cell_path(cause.cell);
                 format!("{path} {} {}", kind.name(), kind.inputs()[cause.pin])
             };
-            steps.push(Step {
+            steps.push(PathStep {
                 arc: arrival.cause.map(cell),
                 net: net_of(index),
                 edge: edge_of(index),
@@ -346,7 +346,7 @@ impl Arrivals<'_> {
 
 /// One change on a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Step {
+pub struct PathStep {
     /// The arc that causes it: cell path, kind and input pin. `None` at the start.
     pub arc: Option<String>,
     /// Which net changes.
@@ -361,7 +361,7 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Path {
     /// Changes in order, the start first.
-    pub steps: Vec<Step>,
+    pub steps: Vec<PathStep>,
 }
 
 impl Path {

@@ -88,7 +88,7 @@ impl Timing {
             models: vec![DelayModel::Inertial; CellKind::ALL.len()],
             of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),
             limits: CellKind::ALL
-                .map(|kind| InstanceLimits::of(library.checks(kind), corner))
+                .map(|kind| InstanceLimits::from_library(library.checks(kind), corner))
                 .into(),
             own_limits: BTreeMap::new(),
         }
@@ -96,7 +96,7 @@ impl Timing {
 
     /// Delays of one cell.
     #[inline]
-    pub fn of(&self, cell: usize) -> &CellDelays {
+    pub fn cell_delays(&self, cell: usize) -> &CellDelays {
         &self.sets[self.of_cell[cell] as usize]
     }
 
@@ -188,7 +188,7 @@ mod tests {
         m.gate(CellKind::Inv, &[b]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
-        let nominal = *timing.of(0);
+        let nominal = *timing.cell_delays(0);
         let slow = [[ArcDelay {
             rise_fs: 9,
             fall_fs: 8,
@@ -198,8 +198,8 @@ mod tests {
         timing.set(1, slow);
         assert_eq!(timing.model(0), DelayModel::Inertial);
         assert_eq!(timing.model(1), DelayModel::Transport);
-        assert_eq!(*timing.of(0), nominal);
-        assert_eq!(*timing.of(1), slow);
-        assert_eq!(timing.of(1)[0][0].to(Logic::X), 8);
+        assert_eq!(*timing.cell_delays(0), nominal);
+        assert_eq!(*timing.cell_delays(1), slow);
+        assert_eq!(timing.cell_delays(1)[0][0].delay_fs(Logic::X), 8);
     }
 }

@@ -122,7 +122,7 @@ pub fn varied_as(
         let mismatch = mismatch.filter(|_| !wires.contains(&index));
         let own = mismatch.map_or(1.0, |m| m.factor(&path(index), cell.kind.transistors()));
         let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
-        let mut delays = *nominal.of(index);
+        let mut delays = *nominal.cell_delays(index);
         for arc in delays.as_flattened_mut() {
             arc.rise_fs = scale(arc.rise_fs);
             arc.fall_fs = scale(arc.fall_fs);
@@ -194,14 +194,14 @@ mod tests {
         m.cell("flip_flop", CellKind::Dffr, &pins, &[Some(q), None]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let library = Library::generic_40nm();
-        let of = |library: &Library| Timing::nominal(&netlist, library, Corner::Typ);
+        let timing = |library: &Library| Timing::nominal(&netlist, library, Corner::Typ);
         let (slow, derated) = (
-            varied(&netlist, &of(&library), 1.5, None),
-            of(&derated_limits(&library, 1.5)),
+            varied(&netlist, &timing(&library), 1.5, None),
+            timing(&derated_limits(&library, 1.5)),
         );
         let limits = |timing: &Timing| *timing.limits(0, CellKind::Dffr);
         assert_eq!(limits(&slow), limits(&derated));
-        assert_ne!(limits(&slow), limits(&of(&library)));
+        assert_ne!(limits(&slow), limits(&timing(&library)));
     }
 
     #[test]

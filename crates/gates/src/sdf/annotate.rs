@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
+use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, SkippedEntry};
 use crate::InputError;
 use crate::netlist::{ArcDelay, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing};
 
@@ -16,7 +16,7 @@ pub struct Annotation {
     /// Timing checks of single instances whose limits were taken over.
     pub checks: usize,
     /// Delays and limits that could not be taken over as they are.
-    pub notes: Vec<Skipped>,
+    pub notes: Vec<SkippedEntry>,
     /// Longest wire delay left out because it ends at a flip-flop's D, fs.
     pub longest_wire_to_d_fs: i64,
 }
@@ -96,11 +96,11 @@ impl Annotator<'_, '_, '_> {
         line: usize,
         message: impl Into<String>,
     ) -> Result<T, InputError> {
-        Err(InputError::at(&self.sdf.source, line, message))
+        Err(InputError::at_line(&self.sdf.source, line, message))
     }
 
     pub(super) fn note(&mut self, what: &'static str, line: usize) {
-        Skipped::count(&mut self.result.notes, what, line);
+        SkippedEntry::count(&mut self.result.notes, what, line);
     }
 
     fn cell(&mut self, timing: &mut Timing, entry: &SdfCell<'_>) -> Result<(), InputError> {
@@ -140,7 +140,7 @@ impl Annotator<'_, '_, '_> {
                 } else {
                     return self.error(
                         entry.line,
-                        match self.elsewhere(path) {
+                        match self.alternative_path(path) {
                             Some(meant) => format!(
                                 "the chip has no instance {path}, but has {meant}; give paths below its top and the right DIVIDER"
                             ),
@@ -162,7 +162,7 @@ impl Annotator<'_, '_, '_> {
     }
 
     /// The instance that a path may mean: with the other divider, or below a testbench.
-    fn elsewhere(&self, path: &str) -> Option<String> {
+    fn alternative_path(&self, path: &str) -> Option<String> {
         let dotted = path.replace("\\.", ".").replace('/', ".");
         let mut rest = Some(dotted.as_str());
         let mut below = std::iter::from_fn(|| {
@@ -210,7 +210,7 @@ impl Annotator<'_, '_, '_> {
                     self.check_arc(kind, pin, from, delay.line)?;
                     let output = self.output(kind, to, delay.line)?;
                     last_line[pin] = delay.line;
-                    let before = timing.of(cell)[pin][output];
+                    let before = timing.cell_delays(cell)[pin][output];
                     self.fill(before, &mut slots[pin][output], from.edge, delay);
                 }
                 DelayPath::Device(to) => {
@@ -224,7 +224,7 @@ impl Annotator<'_, '_, '_> {
                     for pin in (0..kind.inputs().len()).filter(|&p| kind.triggers(p)) {
                         last_line[pin] = delay.line;
                         for output in outputs.clone() {
-                            let before = timing.of(cell)[pin][output];
+                            let before = timing.cell_delays(cell)[pin][output];
                             self.fill(before, &mut slots[pin][output], None, delay);
                         }
                     }
@@ -239,7 +239,7 @@ impl Annotator<'_, '_, '_> {
                 }
             }
         }
-        let mut delays = *timing.of(cell);
+        let mut delays = *timing.cell_delays(cell);
         let mut changed = false;
         let outputs = kind.outputs().len();
         for (pin, output) in (0..kind.inputs().len() * outputs).map(|n| (n / outputs, n % outputs))
@@ -267,7 +267,7 @@ impl Annotator<'_, '_, '_> {
                 self.note(LONGEST_ARC, last_line[pin]);
             }
         }
-        if changed && delays != *timing.of(cell) {
+        if changed && delays != *timing.cell_delays(cell) {
             timing.set(cell, delays);
         }
         Ok(())
@@ -287,7 +287,7 @@ impl Annotator<'_, '_, '_> {
                 continue;
             }
             for (slot, (value, before)) in slot.iter_mut().zip(values) {
-                if let Some(fs) = value.at(self.corner) {
+                if let Some(fs) = value.in_corner_fs(self.corner) {
                     *slot = Some(if delay.increment {
                         slot.unwrap_or(before as i64) + fs
                     } else {

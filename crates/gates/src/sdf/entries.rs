@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::parser::{Parser, Result};
 use super::tokens::Token;
-use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, Skipped, Triple};
+use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, SkippedEntry, Triple};
 use crate::netlist::Edge;
 
 /// Longest delay or limit, fs: 4.29 µs, what delays are stored in.
@@ -60,17 +60,17 @@ impl<'a> Parser<'a, '_> {
     fn rise_and_fall(&mut self, may_be_negative: bool) -> Result<(Triple, Triple)> {
         let mut values = Vec::new();
         while self.is_next(Token::Open)? {
-            self.take()?;
+            self.next_token()?;
             if matches!(self.peek()?, Token::Word(w) if w.eq_ignore_ascii_case("RETAIN")) {
-                Skipped::count(&mut self.skipped, "RETAIN", self.line);
+                SkippedEntry::count(&mut self.skipped, "RETAIN", self.line);
                 self.skip_list()?;
                 continue;
             }
             let value = if self.is_next(Token::Open)? {
-                self.take()?;
+                self.next_token()?;
                 let value = self.triple()?;
                 if !self.is_next(Token::Close)? {
-                    Skipped::count(&mut self.skipped, "pulse limits", self.line);
+                    SkippedEntry::count(&mut self.skipped, "pulse limits", self.line);
                 }
                 self.skip_list()?;
                 value
@@ -87,7 +87,7 @@ impl<'a> Parser<'a, '_> {
         }
         self.close()?;
         if values.len() > 2 {
-            Skipped::count(&mut self.skipped, "transitions to and from Z", self.line);
+            SkippedEntry::count(&mut self.skipped, "transitions to and from Z", self.line);
         }
         match values[..] {
             [] => self.error("a delay has no value; give it one in parentheses"),
@@ -101,7 +101,7 @@ impl<'a> Parser<'a, '_> {
         let mut members = [None; 3];
         let mut at = 0;
         loop {
-            match self.take()? {
+            match self.next_token()? {
                 Token::Close => break,
                 Token::Colon if at < 2 => at += 1,
                 Token::Word(word) if members[at].is_none() => {
@@ -141,7 +141,7 @@ impl<'a> Parser<'a, '_> {
             let pin = self.name("a pin")?;
             return Ok(PinEdge { edge: None, pin });
         }
-        self.take()?;
+        self.next_token()?;
         let edge = match self.word("an edge")?.to_ascii_lowercase().as_str() {
             "posedge" | "01" => Edge::Rise,
             "negedge" | "10" => Edge::Fall,
@@ -185,7 +185,7 @@ impl<'a> Parser<'a, '_> {
         }
         // A check that holds only sometimes must not become one that always does.
         if conditional {
-            Skipped::count(&mut self.skipped, "COND", line);
+            SkippedEntry::count(&mut self.skipped, "COND", line);
             return Ok(None);
         }
         Ok(Some(SdfCheck {
@@ -204,7 +204,7 @@ impl<'a> Parser<'a, '_> {
             let mut beyond = self.tokens.clone();
             if matches!(beyond.next(), Ok((Token::Word(w), _)) if w.eq_ignore_ascii_case("COND")) {
                 *conditional = true;
-                self.take()?;
+                self.next_token()?;
                 self.skip_list()?;
                 let pin = Cow::Borrowed("");
                 return Ok(PinEdge { edge: None, pin });

@@ -27,7 +27,7 @@ enum Role {
 }
 
 impl Role {
-    fn of(pin: &str) -> Self {
+    fn from_pin(pin: &str) -> Self {
         match pin {
             "D" => Role::Data,
             "CK" => Role::Clock,
@@ -68,7 +68,7 @@ impl Annotator<'_, '_, '_> {
             // Two limits are one for each of two slots; one limit may be for both.
             let of_slot = [0, check.kind.limits() - 1].map(|limit| check.limits[limit]);
             for (slot, limit) in slots.into_iter().zip(of_slot) {
-                let (Some(slot), Some(fs)) = (slot, limit.at(self.corner)) else {
+                let (Some(slot), Some(fs)) = (slot, limit.in_corner_fs(self.corner)) else {
                     continue;
                 };
                 if fs < 0 {
@@ -87,7 +87,7 @@ impl Annotator<'_, '_, '_> {
 
 /// What an entry's limits stand for; nothing where a flip-flop does not act on such pins or edges.
 fn slots(check: &SdfCheck<'_>) -> [Option<Slot>; 2] {
-    let pin = Role::of(&check.pin.pin);
+    let pin = Role::from_pin(&check.pin.pin);
     let edge = check.pin.edge;
     if check.kind == Entry::Width {
         let high = edge != Some(Edge::Fall);
@@ -103,7 +103,7 @@ fn slots(check: &SdfCheck<'_>) -> [Option<Slot>; 2] {
         };
     }
     let clocked = check.reference.as_ref().is_some_and(|reference| {
-        Role::of(&reference.pin) == Role::Clock && reference.edge != Some(Edge::Fall)
+        Role::from_pin(&reference.pin) == Role::Clock && reference.edge != Some(Edge::Fall)
     });
     let data = |check| (pin == Role::Data && clocked).then_some((check, Control::Reset, edge));
     let released = clocked && edge != Some(Edge::Rise);
@@ -133,7 +133,7 @@ fn enter(limits: &mut InstanceLimits, (check, control, edge): Slot, fs: u32) {
 /// The checks of a flip-flop with these limits in the three corners.
 pub(crate) fn checks_of(kind: CellKind, corners: [&InstanceLimits; 3]) -> Vec<SdfCheck<'static>> {
     let limit = |control, check, edge| {
-        Triple(corners.map(|limits| Some(limits.at(control, check, edge).into())))
+        Triple(corners.map(|limits| Some(limits.limit_fs(control, check, edge).into())))
     };
     let pin = |edge, pin: &'static str| PinEdge {
         edge: Some(edge),
@@ -264,17 +264,17 @@ mod tests {
         ];
         for (text, check, control, wanted) in given {
             let (limits, result) = limits_of(&body(text), "u1.dffsr");
-            let found = Edge::BOTH.map(|edge| limits.at(control, check, edge));
+            let found = Edge::BOTH.map(|edge| limits.limit_fs(control, check, edge));
             assert_eq!((found, result.checks), (wanted, 1), "{text}");
             assert_eq!(limits_of(&body(text), "u2.dffsr").0, nominal, "{text}");
             let differing = [Control::Reset, Control::Set].iter().flat_map(|&control| {
                 let all = Check::ALL.iter().map(move |&check| (control, check));
                 all.filter(|&(control, check)| {
-                    let at = |limits: &InstanceLimits| {
-                        limits.at(control, check, Edge::Rise)
-                            ^ limits.at(control, check, Edge::Fall) << 16
+                    let both_edges = |limits: &InstanceLimits| {
+                        limits.limit_fs(control, check, Edge::Rise)
+                            ^ limits.limit_fs(control, check, Edge::Fall) << 16
                     };
-                    at(&limits) != at(&nominal)
+                    both_edges(&limits) != both_edges(&nominal)
                 })
             });
             let alone = !text.contains("RECREM") && !text.contains("SETUPHOLD");

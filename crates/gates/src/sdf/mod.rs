@@ -80,7 +80,7 @@ impl Triple {
     }
 
     /// The member of one corner, fs.
-    pub const fn at(self, corner: Corner) -> Option<i64> {
+    pub const fn in_corner_fs(self, corner: Corner) -> Option<i64> {
         self.0[corner as usize]
     }
 }
@@ -127,7 +127,7 @@ impl SdfDelay<'_> {
     pub fn has_value(&self, corner: Corner) -> bool {
         [self.rise, self.fall]
             .iter()
-            .any(|value| value.at(corner).is_some())
+            .any(|value| value.in_corner_fs(corner).is_some())
     }
 }
 
@@ -202,7 +202,9 @@ pub struct SdfCheck<'a> {
 impl SdfCheck<'_> {
     /// Whether it gives a limit for a corner.
     pub fn has_value(&self, corner: Corner) -> bool {
-        self.limits.iter().any(|limit| limit.at(corner).is_some())
+        self.limits
+            .iter()
+            .any(|limit| limit.in_corner_fs(corner).is_some())
     }
 }
 
@@ -245,7 +247,7 @@ pub struct SdfHeader<'a> {
 
 /// Something left out of a file or an annotation.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Skipped {
+pub struct SkippedEntry {
     /// What it was.
     pub what: &'static str,
     /// How often.
@@ -254,11 +256,11 @@ pub struct Skipped {
     pub first_line: usize,
 }
 
-impl Skipped {
-    fn count(list: &mut Vec<Skipped>, what: &'static str, line: usize) {
+impl SkippedEntry {
+    fn count(list: &mut Vec<SkippedEntry>, what: &'static str, line: usize) {
         match list.iter_mut().find(|s| s.what == what) {
             Some(skipped) => skipped.count += 1,
-            None => list.push(Skipped {
+            None => list.push(SkippedEntry {
                 what,
                 count: 1,
                 first_line: line,
@@ -277,7 +279,7 @@ pub struct Sdf<'a> {
     /// Its entries in file order.
     pub cells: Vec<SdfCell<'a>>,
     /// Constructs of the format that are not modelled.
-    pub skipped: Vec<Skipped>,
+    pub skipped: Vec<SkippedEntry>,
 }
 
 impl Sdf<'_> {

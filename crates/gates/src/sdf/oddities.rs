@@ -70,7 +70,8 @@ pub fn oddities(sdf: &Sdf<'_>, corner: Corner) -> Vec<Oddity> {
         let is_of_cell = matches!(delay.path, DelayPath::IoPath(..) | DelayPath::Device(_));
         is_of_cell && !delay.increment
     };
-    let given = |delay: &SdfDelay<'_>| [delay.rise, delay.fall].map(|delay| delay.at(corner));
+    let given =
+        |delay: &SdfDelay<'_>| [delay.rise, delay.fall].map(|delay| delay.in_corner_fs(corner));
     let arcs = sdf.cells.iter().flat_map(|cell| &cell.delays);
     let arcs = arcs
         .filter(is_arc)
@@ -144,14 +145,14 @@ mod tests {
                 .map(told)
                 .collect::<Vec<_>>()
         };
-        let of = |instance: &str, delay: &str| {
+        let sdf_cell = |instance: &str, delay: &str| {
             format!(
                 "(CELL (CELLTYPE \"INV\") (INSTANCE {instance}) (DELAY (ABSOLUTE (IOPATH A Z {delay}))))\n"
             )
         };
         let (ten, zero) = ("(10)", "(0)");
-        assert_eq!(told(&of("a", ten)), []);
-        let all = told(&(of("a", zero) + &of("b", zero)));
+        assert_eq!(told(&sdf_cell("a", ten)), []);
+        let all = told(&(sdf_cell("a", zero) + &sdf_cell("b", zero)));
         assert_eq!(
             all,
             [(
@@ -159,12 +160,12 @@ mod tests {
                 "every delay is zero, so that gates switch at once".to_owned()
             )]
         );
-        let some = told(&(of("a", ten) + &of("b", zero) + &of("c", zero)));
+        let some = told(&(sdf_cell("a", ten) + &sdf_cell("b", zero) + &sdf_cell("c", zero)));
         assert_eq!(some, [(4, "2 of 3 delays are zero".to_owned())]);
         let again = "delays of a cell are given again, after line 3, and the last ones count";
-        let twice = of("a", ten) + &of("b", ten) + &of("a", ten);
+        let twice = sdf_cell("a", ten) + &sdf_cell("b", ten) + &sdf_cell("a", ten);
         assert_eq!(told(&twice), [(5, again.to_owned())]);
-        let often = told(&(twice + &of("b", ten)));
+        let often = told(&(twice + &sdf_cell("b", ten)));
         assert_eq!(often, [(5, format!("{again} (2 such entries)"))]);
     }
 }

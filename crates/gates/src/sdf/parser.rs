@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::tokens::{Token, Tokens};
-use super::{Sdf, SdfCell, SdfHeader, SdfInstance, Skipped};
+use super::{Sdf, SdfCell, SdfHeader, SdfInstance, SkippedEntry};
 use crate::InputError;
 
 const HEADER_TEXTS: [&str; 9] = [
@@ -70,25 +70,25 @@ pub(super) struct Parser<'a, 's> {
     /// Line of the last token taken.
     pub(super) line: usize,
     pub(super) header: SdfHeader<'a>,
-    pub(super) skipped: Vec<Skipped>,
+    pub(super) skipped: Vec<SkippedEntry>,
 }
 
 impl<'a> Parser<'a, '_> {
     pub(super) fn error<T>(&self, message: impl Into<String>) -> Result<T> {
-        Err(InputError::at(self.source, self.line, message))
+        Err(InputError::at_line(self.source, self.line, message))
     }
 
     pub(super) fn peek(&mut self) -> Result<Token<'a>> {
         if self.ahead.is_none() {
             let next = self.tokens.next();
             let next =
-                next.map_err(|(line, message)| InputError::at(self.source, line, message))?;
+                next.map_err(|(line, message)| InputError::at_line(self.source, line, message))?;
             self.ahead = Some(next);
         }
         Ok(self.ahead.map_or(Token::End, |(token, _)| token))
     }
 
-    pub(super) fn take(&mut self) -> Result<Token<'a>> {
+    pub(super) fn next_token(&mut self) -> Result<Token<'a>> {
         let token = self.peek()?;
         if let Some((_, line)) = self.ahead.take() {
             self.line = line;
@@ -115,7 +115,7 @@ impl<'a> Parser<'a, '_> {
     }
 
     fn expect(&mut self, token: Token<'_>, name: &str) -> Result<()> {
-        match self.take()? {
+        match self.next_token()? {
             t if t == token => Ok(()),
             t => self.unexpected(t, name),
         }
@@ -130,7 +130,7 @@ impl<'a> Parser<'a, '_> {
     }
 
     pub(super) fn word(&mut self, wanted: &str) -> Result<&'a str> {
-        match self.take()? {
+        match self.next_token()? {
             Token::Word(word) => Ok(word),
             token => self.unexpected(token, wanted),
         }
@@ -139,7 +139,7 @@ impl<'a> Parser<'a, '_> {
     /// `(KEYWORD`, in capitals, or nothing where the list is closed.
     pub(super) fn entry(&mut self) -> Result<Option<String>> {
         if self.is_next(Token::Close)? {
-            self.take()?;
+            self.next_token()?;
             return Ok(None);
         }
         self.open()?;
@@ -150,7 +150,7 @@ impl<'a> Parser<'a, '_> {
     pub(super) fn skip_list(&mut self) -> Result<()> {
         let mut depth = 1;
         while depth > 0 {
-            match self.take()? {
+            match self.next_token()? {
                 Token::Open => depth += 1,
                 Token::Close => depth -= 1,
                 Token::End => return self.unexpected(Token::End, ")"),
@@ -164,7 +164,7 @@ impl<'a> Parser<'a, '_> {
     pub(super) fn leave_out(&mut self, keyword: &str) -> Result<()> {
         match LEFT_OUT.iter().find(|k| **k == keyword) {
             Some(what) => {
-                Skipped::count(&mut self.skipped, what, self.line);
+                SkippedEntry::count(&mut self.skipped, what, self.line);
                 self.skip_list()
             }
             None => {
@@ -215,7 +215,7 @@ impl<'a> Parser<'a, '_> {
                 let mut text = self.word("a time scale")?.to_owned();
                 if let Token::Word(unit) = self.peek()? {
                     text += unit;
-                    self.take()?;
+                    self.next_token()?;
                 }
                 let Some(scale) = timescale_fs(&text) else {
                     return self.error(format!(
@@ -231,7 +231,7 @@ impl<'a> Parser<'a, '_> {
                 };
                 let mut text = Cow::Borrowed("");
                 loop {
-                    match self.take()? {
+                    match self.next_token()? {
                         Token::Close => break,
                         Token::Text(part) | Token::Word(part) if text.is_empty() => {
                             text = Cow::Borrowed(part);
@@ -253,7 +253,7 @@ impl<'a> Parser<'a, '_> {
         if !self.word("CELLTYPE")?.eq_ignore_ascii_case("CELLTYPE") {
             return self.error("a CELL begins with (CELLTYPE \"…\"); add its type");
         }
-        let cell_type = match self.take()? {
+        let cell_type = match self.next_token()? {
             Token::Text(name) => name,
             token => return self.unexpected(token, "a quoted cell type"),
         };
@@ -274,7 +274,7 @@ impl<'a> Parser<'a, '_> {
                 "INSTANCE" => {
                     has_instance = true;
                     if let Token::Word(word) = self.peek()? {
-                        self.take()?;
+                        self.next_token()?;
                         cell.instance = match word {
                             "*" => SdfInstance::Every,
                             _ => SdfInstance::Path(self.path(word)),

@@ -31,7 +31,7 @@ impl Annotator<'_, '_, '_> {
                 let message = "a stage of a delay has one path; give it an IOPATH A Z";
                 return self.error(delay.line, message);
             }
-            let arc = timing.of(cell)[0][0];
+            let arc = timing.cell_delays(cell)[0][0];
             let (stages, line) = self.stages.entry(cell).or_insert_with(|| {
                 let parts = chain.parts(arc.rise_fs).zip(chain.parts(arc.fall_fs));
                 let parts = parts.map(|(rise, fall)| [rise, fall].map(i64::from));
@@ -39,7 +39,7 @@ impl Annotator<'_, '_, '_> {
             });
             *line = delay.line;
             for (member, value) in stages[number].iter_mut().zip([delay.rise, delay.fall]) {
-                if let Some(fs) = value.at(self.corner) {
+                if let Some(fs) = value.in_corner_fs(self.corner) {
                     *member = fs + if delay.increment { *member } else { 0 };
                 }
             }
@@ -65,7 +65,7 @@ impl Annotator<'_, '_, '_> {
             }
             let [rise_fs, fall_fs] = sums;
             let arcs = [[ArcDelay { rise_fs, fall_fs }; MAX_OUTPUTS]; MAX_INPUTS];
-            if arcs[0][0] != timing.of(cell)[0][0] {
+            if arcs[0][0] != timing.cell_delays(cell)[0][0] {
                 timing.set(cell, arcs);
             }
         }

@@ -42,7 +42,7 @@ fn same(netlist: &Netlist, a: &Timing, b: &Timing) -> bool {
         let (inputs, outputs) = (flat.kind.inputs().len(), flat.kind.outputs().len());
         let pins = (0..inputs).flat_map(|input| (0..outputs).map(move |output| (input, output)));
         pins.into_iter()
-            .all(|(i, o)| a.of(cell)[i][o] == b.of(cell)[i][o])
+            .all(|(i, o)| a.cell_delays(cell)[i][o] == b.cell_delays(cell)[i][o])
     })
 }
 
@@ -76,7 +76,7 @@ fn arc_to(body: &str, path: &str, (pin, output): (usize, usize)) -> (u32, u32) {
     let path = format!("chip.{path}");
     let mut cells = 0..netlist.cells().len();
     let cell = cells.find(|&c| netlist.cell_path(c) == path).unwrap();
-    let arc = timing.of(cell)[pin][output];
+    let arc = timing.cell_delays(cell)[pin][output];
     (arc.rise_fs, arc.fall_fs)
 }
 
@@ -86,17 +86,17 @@ fn inv(delays: &str) -> String {
 
 #[test]
 fn one_value_serves_both_directions_and_missing_ones_change_nothing() {
-    let of = |delays: &str| {
+    let inverter_arc = |delays: &str| {
         arc(
             &inv(&format!("(ABSOLUTE (IOPATH A Z {delays}))")),
             "u1.inv",
             0,
         )
     };
-    assert_eq!(of("(0.12:0.15:0.2)"), (150, 150));
-    assert_eq!(of("(0.12::0.2)"), (21_013, 18_979));
-    assert_eq!(of("() (1e1)"), (21_013, 10_000));
-    assert_eq!(of("((1:2:3) (4:5:6)) (7) (8)"), (2_000, 7_000));
+    assert_eq!(inverter_arc("(0.12:0.15:0.2)"), (150, 150));
+    assert_eq!(inverter_arc("(0.12::0.2)"), (21_013, 18_979));
+    assert_eq!(inverter_arc("() (1e1)"), (21_013, 10_000));
+    assert_eq!(inverter_arc("((1:2:3) (4:5:6)) (7) (8)"), (2_000, 7_000));
     let twice = "(ABSOLUTE (IOPATH A Z (1) (2))) (INCREMENT (IOPATH A Z (0.5) (-1)))";
     assert_eq!(arc(&inv(twice), "u1.inv", 0), (1_500, 1_000));
     let increment = "(INCREMENT (IOPATH A Z (1)))";
@@ -180,7 +180,7 @@ fn stages_of_a_chain_add_up_to_its_cell() {
             &Sdf::parse("a.sdf", &text)?,
             Corner::Typ,
         )?;
-        let arc = timing.of(0)[0][0];
+        let arc = timing.cell_delays(0)[0][0];
         Ok::<_, InputError>((arc.rise_fs, arc.fall_fs))
     };
     let stage = |number: u32, cell_type: &str, entry: &str| {
@@ -418,7 +418,7 @@ fn randomised(netlist: &Netlist, corner: Corner, values: &[u32]) -> Timing {
     let mut timing = nominal(netlist, corner);
     let mut values = values.iter().cycle().copied();
     for (index, cell) in netlist.cells().iter().enumerate() {
-        let mut delays = *timing.of(index);
+        let mut delays = *timing.cell_delays(index);
         for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin)) {
             for delay in &mut delays[pin][..cell.kind.outputs().len()] {
                 delay.rise_fs = values.next().unwrap();

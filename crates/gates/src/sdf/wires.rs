@@ -70,7 +70,7 @@ impl Annotator<'_, '_, '_> {
 
     pub(super) fn wire(&mut self, cell: usize, pin: usize, delay: &SdfDelay<'_>) {
         let kind = self.netlist.cells()[cell].kind;
-        let values = [delay.rise, delay.fall].map(|triple| triple.at(self.corner));
+        let values = [delay.rise, delay.fall].map(|triple| triple.in_corner_fs(self.corner));
         if !kind.triggers(pin) {
             let longest = values.into_iter().flatten().max().unwrap_or(0);
             self.result.longest_wire_to_d_fs = self.result.longest_wire_to_d_fs.max(longest);
@@ -102,7 +102,7 @@ impl Annotator<'_, '_, '_> {
         wires.sort_unstable_by_key(|((cell, pin), wire)| (wire.line, *cell, *pin));
         for ((cell, pin), wire) in wires {
             let kind = self.netlist.cells()[cell].kind;
-            let mut delays = *timing.of(cell);
+            let mut delays = *timing.cell_delays(cell);
             let mut unequal = false;
             let arcs = delays[pin][..kind.outputs().len()].iter_mut();
             for (delay, rises) in

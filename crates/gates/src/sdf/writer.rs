@@ -70,7 +70,7 @@ pub fn write_sdf(
         let path = netlist.scope_path(index);
         let path = path[design.len()..].trim_start_matches('.');
         for (cell, leaf) in netlist.cells_of(index).zip(scope.module.cells()) {
-            let delays = corners.map(|timing| *timing.of(cell));
+            let delays = corners.map(|timing| *timing.cell_delays(cell));
             let limits = corners.map(|timing| timing.limits(cell, leaf.kind));
             write_cell(out, &join(path, &leaf.name), leaf, delays, limits, options)?;
         }
@@ -93,7 +93,8 @@ pub fn write_library_sdf(
     // All cells of a kind are alike: their text is made once.
     let bodies = CellKind::ALL.map(|kind| {
         let delays = Corner::ALL.map(|corner| library.delays(kind, corner));
-        let limits = Corner::ALL.map(|corner| InstanceLimits::of(library.checks(kind), corner));
+        let limits =
+            Corner::ALL.map(|corner| InstanceLimits::from_library(library.checks(kind), corner));
         body(kind, delays, Some(limits.each_ref()), options)
     });
     let mut cells = 0;
@@ -106,7 +107,8 @@ pub fn write_library_sdf(
         };
         let whole = join(top.name(), &path);
         let delays = Corner::ALL.map(|corner| own.delays(|| whole.clone(), corner));
-        let limits = Corner::ALL.map(|corner| InstanceLimits::of(library.checks(kind), corner));
+        let limits =
+            Corner::ALL.map(|corner| InstanceLimits::from_library(library.checks(kind), corner));
         write_cell(out, &path, leaf, delays, limits.each_ref(), options)
     })?;
     writeln!(out, ")")?;
@@ -153,7 +155,7 @@ fn write_cell(
     options: SdfOptions,
 ) -> io::Result<()> {
     let kind = leaf.kind;
-    let Some(chain) = Chain::of(kind, leaf.own_delay) else {
+    let Some(chain) = Chain::from_delay(kind, leaf.own_delay) else {
         let body = body(kind, delays, Some(limits), options);
         return write_entry(out, kind.name(), path, &body, options);
     };

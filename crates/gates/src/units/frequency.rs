@@ -183,7 +183,7 @@ pub struct Every {
 impl Every {
     /// The `n`-th of them; the first is number 0, at time 0.
     #[inline]
-    pub fn at(&self, n: u32) -> Time {
+    pub fn time(&self, n: u32) -> Time {
         let half = self.modulus / 2;
         let short = self.rest.checked_mul(n.into());
         let rest = match short.and_then(|rest| rest.checked_add(half)) {
@@ -222,10 +222,10 @@ mod tests {
         for hz in [0.5, 2e12] {
             assert_eq!(Frequency::from_hz_f64(hz), Err(OutOfRange(hz)));
         }
-        let of = |fs| Frequency::from_period(Time::from_fs(fs));
-        assert_eq!(of(0), Err(NotPositive(f64::INFINITY)));
-        assert_eq!(of(-4), Err(NotPositive(-2.5e14)));
-        assert_eq!(of(500), Err(OutOfRange(2e12)));
+        let from_period_fs = |fs| Frequency::from_period(Time::from_fs(fs));
+        assert_eq!(from_period_fs(0), Err(NotPositive(f64::INFINITY)));
+        assert_eq!(from_period_fs(-4), Err(NotPositive(-2.5e14)));
+        assert_eq!(from_period_fs(500), Err(OutOfRange(2e12)));
         assert_eq!(Frequency::from_hz_f64(1.5).unwrap().as_hz(), 1.5);
     }
 
@@ -289,7 +289,7 @@ mod tests {
             let f = Frequency::from_hz_f64(hz).unwrap();
             let k = i64::from(n) * i64::from(periods);
             prop_assume!((k as f64) < 9e3 * hz);
-            prop_assert_eq!(f.every(periods).at(n), f.periods(k));
+            prop_assert_eq!(f.every(periods).time(n), f.periods(k));
         }
 
         #[test]

@@ -102,7 +102,7 @@ pub fn write_parametric_cells(
         writeln!(out, "\nmodule {name}(output {outputs}, input {inputs});")?;
         for (pin, output, name) in arc_names(kind) {
             let arc = library.arcs(kind)[pin][output];
-            let (rise, fall) = (arc.rise.at(corner), arc.fall.at(corner));
+            let (rise, fall) = (arc.rise.in_corner_fs(corner), arc.fall.in_corner_fs(corner));
             writeln!(out, "  parameter [31:0] RISE_{name} = {rise};")?;
             writeln!(out, "  parameter [31:0] FALL_{name} = {fall};")?;
         }
@@ -151,7 +151,7 @@ pub fn write_delays(
                 writeln!(out, "  defparam {path}.{}.TRANSPORT = 1;", leaf.name)?;
             }
             for (pin, output, name) in arc_names(leaf.kind) {
-                let [arc, nominal] = [timing, library].map(|t| t.of(cell)[pin][output]);
+                let [arc, nominal] = [timing, library].map(|t| t.cell_delays(cell)[pin][output]);
                 let values = [
                     ("RISE", arc.rise_fs, nominal.rise_fs),
                     ("FALL", arc.fall_fs, nominal.fall_fs),

@@ -86,7 +86,7 @@ fn write_module(out: &mut dyn Write, module: &Module) -> io::Result<()> {
             .chain(inputs)
             .map(|(pin, &net)| format!(".{pin}({})", names.expression(&[net])))
             .collect();
-        let chain = Chain::of(kind, cell.own_delay).map(Chain::module);
+        let chain = Chain::from_delay(kind, cell.own_delay).map(Chain::module);
         let name = chain.as_deref().unwrap_or(kind.name());
         writeln!(out, "  {name} {}({});", cell.name, pins.join(", "))?;
     }

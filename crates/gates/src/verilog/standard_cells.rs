@@ -165,7 +165,7 @@ pub fn write_standard_cells(
 fn write_chain(out: &mut dyn Write, chain: Chain) -> io::Result<()> {
     let stage = chain.stage_module();
     let typical_fs = chain.parts(chain.typical_fs).last().unwrap_or(0);
-    let delay = Corner::ALL.map(|corner| Delay::scaled(typical_fs).at(corner));
+    let delay = Corner::ALL.map(|corner| Delay::scaled(typical_fs).in_corner_fs(corner));
     writeln!(
         out,
         "\nmodule {stage}(output Z, input A);\n  buf body(Z, A);"
@@ -254,7 +254,7 @@ fn write_specify(
         }
         for (output, arc) in kind.outputs().iter().zip(library.arcs(kind)[pin]) {
             let [rise, fall] = [arc.rise, arc.fall]
-                .map(|delay| reader.triple(Corner::ALL.map(|corner| delay.at(corner))));
+                .map(|delay| reader.triple(Corner::ALL.map(|corner| delay.in_corner_fs(corner))));
             let path = match (*from, *output) {
                 ("CK", "Q") => "posedge CK => (Q +: D)".to_owned(),
                 // Not `-: D`, which Yosys takes for a part-select where it skips these blocks.
@@ -265,7 +265,8 @@ fn write_specify(
         }
     }
     if kind.is_flip_flop() {
-        let limits = Corner::ALL.map(|corner| InstanceLimits::of(library.checks(kind), corner));
+        let limits =
+            Corner::ALL.map(|corner| InstanceLimits::from_library(library.checks(kind), corner));
         for check in checks_of(kind, limits.each_ref()) {
             if check.kind != CheckKeyword::Width || reader == Reader::Simulator {
                 writeln!(out, "    {};", system_task(&check, reader))?;
@@ -278,7 +279,7 @@ fn write_specify(
 /// One check. SDF names the data first; in Verilog they come first where a control is released, and second for D.
 fn system_task(check: &SdfCheck<'_>, reader: Reader) -> String {
     let [first, second] = check.limits.map(|limit| {
-        let corners = Corner::ALL.map(|corner| limit.at(corner).unwrap_or(0));
+        let corners = Corner::ALL.map(|corner| limit.in_corner_fs(corner).unwrap_or(0));
         reader.triple(corners)
     });
     let data = event(&check.pin);

@@ -15,7 +15,7 @@ use fst_writer::{
     FstVarDirection, FstVarType, FstWriteError,
 };
 
-use super::selection::Selection;
+use super::selection::WaveSelection;
 use super::variables::{Declaration, Declare, Variables};
 use super::writer::{Format, WaveWriter};
 use crate::Origin;
@@ -33,7 +33,7 @@ impl<W: Read + Write + Seek> FstWriter<W> {
     ///
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
-    pub fn new(out: W, netlist: &Netlist, selection: &Selection) -> io::Result<Self> {
+    pub fn new(out: W, netlist: &Netlist, selection: &WaveSelection) -> io::Result<Self> {
         Self::with_origin(out, netlist, selection, Origin::default())
     }
 
@@ -44,7 +44,7 @@ impl<W: Read + Write + Seek> FstWriter<W> {
     pub fn with_origin(
         out: W,
         netlist: &Netlist,
-        selection: &Selection,
+        selection: &WaveSelection,
         origin: Origin,
     ) -> io::Result<Self> {
         let info = FstInfo {
@@ -70,7 +70,7 @@ impl<W: Read + Write + Seek> FstWriter<W> {
             stamped: Time::ZERO,
             error: None,
         };
-        Ok(WaveWriter::of(fst, netlist, variables))
+        Ok(WaveWriter::from_variables(fst, netlist, variables))
     }
 }
 

@@ -10,7 +10,7 @@
 
 use std::io::{self, Write};
 
-use super::layout::{Layout, MARKS, Radix, Shape, mark, one_line};
+use super::layout::{Layout, MARKS, Radix, SignalShape, mark, one_line};
 use crate::Origin;
 use crate::netlist::Netlist;
 use crate::units::Time;
@@ -97,7 +97,7 @@ impl Layout {
             one_line(&group.title)?;
             writeln!(out, "@800200\n-{}", group.title)?;
             for entry in &group.signals {
-                let range = Shape::of(netlist, &entry.path)?.range();
+                let range = SignalShape::find(netlist, &entry.path)?.range();
                 let flags = entry.radix.flags();
                 writeln!(out, "{flags}")?;
                 if let Some(alias) = &entry.alias {
@@ -118,7 +118,7 @@ impl Layout {
             // A brace and a space mark a group.
             name = name.max(group.title.chars().count() + 2);
             for entry in &group.signals {
-                let shape = Shape::of(netlist, &entry.path)?;
+                let shape = SignalShape::find(netlist, &entry.path)?;
                 let last = entry.path.rsplit('.').next().unwrap_or_default();
                 let own = last.len() + shape.range().len();
                 let alias = entry.alias.as_ref().map(|alias| alias.chars().count());
@@ -154,10 +154,10 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::super::layout::sample::{groups, layout, netlist};
-    use super::super::layout::{Entry, Group};
+    use super::super::layout::{Entry, SignalGroup};
     use super::*;
 
-    fn save(groups: Vec<Group>) -> io::Result<String> {
+    fn save(groups: Vec<SignalGroup>) -> io::Result<String> {
         let mut text = Vec::new();
         layout(groups).write_gtkw(&mut text, &netlist(), "x.vcd", Origin::default())?;
         Ok(String::from_utf8(text).unwrap())
@@ -205,13 +205,13 @@ top.Z
     #[test]
     fn a_signal_that_is_not_there_is_named() {
         for path in ["inner.NONE", "outer.BITS", "top.Z", "DATA[1]", ""] {
-            let error = save(vec![Group::new("", [Entry::hex(path)])]).unwrap_err();
+            let error = save(vec![SignalGroup::new("", [Entry::hex(path)])]).unwrap_err();
             assert!(error.to_string().contains(&format!("`{path}`")), "{error}");
         }
     }
 
     #[test]
     fn a_title_is_one_line() {
-        assert!(save(vec![Group::new("two\nlines", [])]).is_err());
+        assert!(save(vec![SignalGroup::new("two\nlines", [])]).is_err());
     }
 }

@@ -70,17 +70,17 @@ impl Entry {
 
 /// Signals under a common title that can be folded away.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Group {
+pub struct SignalGroup {
     /// Title, one line.
     pub title: String,
     /// Signals from top to bottom.
     pub signals: Vec<Entry>,
 }
 
-impl Group {
+impl SignalGroup {
     /// A group from its parts.
     pub fn new(title: impl Into<String>, signals: impl IntoIterator<Item = Entry>) -> Self {
-        Group {
+        SignalGroup {
             title: title.into(),
             signals: signals.into_iter().collect(),
         }
@@ -91,7 +91,7 @@ impl Group {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
     /// Groups from top to bottom.
-    pub groups: Vec<Group>,
+    pub groups: Vec<SignalGroup>,
     /// From when to when to look.
     pub zoom: (Time, Time),
     /// Where the marker stands.
@@ -127,23 +127,23 @@ pub fn mark(place: usize) -> char {
 }
 
 /// What a viewer has to know of a signal.
-pub(super) struct Shape {
+pub(super) struct SignalShape {
     pub width: usize,
     pub is_bus: bool,
 }
 
-impl Shape {
+impl SignalShape {
     /// The shape of the signal at `path`.
     ///
     /// # Errors
     /// When `netlist` has none.
-    pub(super) fn of(netlist: &Netlist, path: &str) -> io::Result<Self> {
+    pub(super) fn find(netlist: &Netlist, path: &str) -> io::Result<Self> {
         let (scope, name) = path.rsplit_once('.').unwrap_or(("", path));
         let signal = netlist
             .scope(scope)
             .and_then(|scope| netlist.scopes()[scope].module.signal(name))
             .ok_or_else(|| no_such("signal", path, netlist))?;
-        Ok(Shape {
+        Ok(SignalShape {
             width: signal.width(),
             is_bus: signal.is_bus,
         })
@@ -196,7 +196,7 @@ pub(super) mod sample {
         Netlist::elaborate(&m.finish().unwrap())
     }
 
-    pub fn layout(groups: Vec<Group>) -> Layout {
+    pub fn layout(groups: Vec<SignalGroup>) -> Layout {
         Layout {
             groups,
             zoom: (Time::from_ns(1), Time::from_ns(3)),
@@ -208,16 +208,16 @@ pub(super) mod sample {
         }
     }
 
-    pub fn groups() -> Vec<Group> {
+    pub fn groups() -> Vec<SignalGroup> {
         vec![
-            Group::new(
+            SignalGroup::new(
                 "Inputs",
                 [
                     Entry::hex("DATA"),
                     Entry::binary("inner.BITS").named("bits, bit 1 first"),
                 ],
             ),
-            Group::new("Results", [Entry::decimal("inner.ONE"), Entry::binary("Z")]),
+            SignalGroup::new("Results", [Entry::decimal("inner.ONE"), Entry::binary("Z")]),
         ]
     }
 }

@@ -14,14 +14,14 @@
 //! use femtogate::kernel::{Drive, Kernel, Stimulus};
 //! use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
 //! use femtogate::units::Time;
-//! use femtogate::waves::{Selection, VcdWriter};
+//! use femtogate::waves::{VcdWriter, WaveSelection};
 //!
 //! let mut m = ModuleBuilder::new("top");
 //! let (a, z) = (m.input("A"), m.output("Z"));
 //! m.gate_into(CellKind::Inv, &[a], z);
 //! let netlist = Netlist::elaborate(&m.finish().unwrap());
 //!
-//! let mut waves = VcdWriter::new(Vec::new(), &netlist, &Selection::all())?;
+//! let mut waves = VcdWriter::new(Vec::new(), &netlist, &WaveSelection::all())?;
 //! let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
 //! let mut kernel = Kernel::new(&netlist, &timing);
 //! let drives = [Drive::new(Time::from_ns(1), netlist.net("A").unwrap(), true)];
@@ -43,8 +43,8 @@ mod vcd;
 mod writer;
 
 pub use fst::{Fst, FstWriter};
-pub use layout::{Entry, Group, Layout, Mark, Radix, mark};
+pub use layout::{Entry, Layout, Mark, Radix, SignalGroup, mark};
 pub use saif::write_saif;
-pub use selection::Selection;
+pub use selection::WaveSelection;
 pub use vcd::{Vcd, VcdWriter};
 pub use writer::{Format, WaveWriter};

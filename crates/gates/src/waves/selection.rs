@@ -8,15 +8,15 @@ use std::io;
 
 use crate::netlist::Netlist;
 
-/// What part of the hierarchy to dump. Starts as [`Selection::all`] and is narrowed from there.
+/// What part of the hierarchy to dump. Starts as [`WaveSelection::all`] and is narrowed from there.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Selection {
+pub struct WaveSelection {
     below: Vec<String>,
     depth: usize,
     with_anonymous: bool,
 }
 
-impl Default for Selection {
+impl Default for WaveSelection {
     fn default() -> Self {
         Self::all()
     }
@@ -33,10 +33,10 @@ pub(super) enum Coverage {
     Signals,
 }
 
-impl Selection {
+impl WaveSelection {
     /// Every signal to which a designer gave a name.
     pub fn all() -> Self {
-        Selection {
+        WaveSelection {
             below: Vec::new(),
             depth: usize::MAX,
             with_anonymous: false,
@@ -45,7 +45,7 @@ impl Selection {
 
     /// Only the scope at this dotted path below the top, and what is below it. Several calls add
     /// up.
-    pub fn below(mut self, path: impl Into<String>) -> Self {
+    pub fn with_scope(mut self, path: impl Into<String>) -> Self {
         self.below.push(path.into());
         self
     }
@@ -137,32 +137,40 @@ mod tests {
         Netlist::elaborate(&module)
     }
 
-    fn coverage(selection: Selection) -> Vec<Coverage> {
+    fn coverage(selection: WaveSelection) -> Vec<Coverage> {
         selection.coverage(&tree()).unwrap()
     }
 
     #[test]
     fn scopes_are_chosen_by_path_and_depth() {
-        assert_eq!(coverage(Selection::all()), [Signals; 7]);
+        assert_eq!(coverage(WaveSelection::all()), [Signals; 7]);
         assert_eq!(
-            coverage(Selection::all().depth(1)),
+            coverage(WaveSelection::all().depth(1)),
             [
                 Signals, Signals, Nothing, Nothing, Signals, Nothing, Nothing
             ]
         );
         assert_eq!(
-            coverage(Selection::all().below("b")),
+            coverage(WaveSelection::all().with_scope("b")),
             [Path, Nothing, Nothing, Nothing, Signals, Signals, Signals]
         );
         assert_eq!(
-            coverage(Selection::all().below("b").below("a.y").depth(0)),
+            coverage(
+                WaveSelection::all()
+                    .with_scope("b")
+                    .with_scope("a.y")
+                    .depth(0)
+            ),
             [Path, Path, Nothing, Signals, Signals, Nothing, Nothing]
         );
     }
 
     #[test]
     fn a_path_that_leads_nowhere_is_named() {
-        let error = Selection::all().below("a.z").coverage(&tree()).unwrap_err();
+        let error = WaveSelection::all()
+            .with_scope("a.z")
+            .coverage(&tree())
+            .unwrap_err();
         assert!(error.to_string().contains("`a.z`"), "{error}");
     }
 }

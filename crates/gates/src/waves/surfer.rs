@@ -10,7 +10,7 @@
 
 use std::io::{self, Write};
 
-use super::layout::{Layout, MARKS, Radix, Shape, mark, one_line};
+use super::layout::{Layout, MARKS, Radix, SignalShape, mark, one_line};
 use crate::netlist::Netlist;
 use crate::units::Time;
 
@@ -54,7 +54,7 @@ impl Layout {
             writeln!(out, "divider_add {}", one_word(&group.title))?;
             items += 1;
             for entry in &group.signals {
-                let shape = Shape::of(netlist, &entry.path)?;
+                let shape = SignalShape::find(netlist, &entry.path)?;
                 writeln!(out, "variable_add {top}.{}", entry.path)?;
                 if shape.width > 1 {
                     writeln!(out, "item_focus {}_", letters(items))?;
@@ -107,10 +107,10 @@ fn letters(place: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::layout::sample::{groups, layout, netlist};
-    use super::super::layout::{Entry, Group};
+    use super::super::layout::{Entry, SignalGroup};
     use super::*;
 
-    fn commands(groups: Vec<Group>) -> io::Result<String> {
+    fn commands(groups: Vec<SignalGroup>) -> io::Result<String> {
         let mut text = Vec::new();
         layout(groups).write_surfer(&mut text, &netlist(), "x.fst", Time::from_ns(17))?;
         Ok(String::from_utf8(text).unwrap())
@@ -145,7 +145,7 @@ marker_set B 2500000
 
     #[test]
     fn a_signal_that_is_not_there_is_named() {
-        let error = commands(vec![Group::new("", [Entry::hex("outer.BITS")])]).unwrap_err();
+        let error = commands(vec![SignalGroup::new("", [Entry::hex("outer.BITS")])]).unwrap_err();
         assert!(error.to_string().contains("`outer.BITS`"), "{error}");
     }
 

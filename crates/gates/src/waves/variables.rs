@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::io;
 use std::ops::Range;
 
-use super::selection::{Coverage, Selection};
+use super::selection::{Coverage, WaveSelection};
 use crate::netlist::{NetId, Netlist};
 
 /// Marks a net that is not shown as a scalar.
@@ -62,7 +62,7 @@ impl Variables {
     /// Those of `out`, and a path in `selection` that does not exist.
     pub(super) fn declare(
         netlist: &Netlist,
-        selection: &Selection,
+        selection: &WaveSelection,
         out: &mut impl Declare,
     ) -> io::Result<Self> {
         let coverage = selection.coverage(netlist)?;
@@ -90,7 +90,7 @@ impl Variables {
             for signal in scope.module.signals() {
                 if signal.width() > 0 && (signal.is_named || selection.includes_anonymous()) {
                     let nets = netlist.signal_nets(scope, signal).rev();
-                    let (variable, is_alias) = variables.of(nets.map(index_of).collect());
+                    let (variable, is_alias) = variables.find_or_add(nets.map(index_of).collect());
                     out.signal(&Declaration {
                         name: &signal.name,
                         width: signal.width() as u32,
@@ -108,7 +108,7 @@ impl Variables {
     }
 
     /// The variable of these nets, most significant first, and whether there was one before.
-    fn of(&mut self, nets: Vec<u32>) -> (u32, bool) {
+    fn find_or_add(&mut self, nets: Vec<u32>) -> (u32, bool) {
         let known = match nets[..] {
             [net] => self.scalar_of_net[net as usize],
             _ => self.buses.get(&nets).copied().unwrap_or(NO_VARIABLE),

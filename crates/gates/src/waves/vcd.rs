@@ -12,7 +12,7 @@ use std::io::{self, BufWriter, Write};
 use vcd::{IdCode, ReferenceIndex, TimescaleUnit, VarType};
 
 use self::text::{BLOCK, Block, Stamp};
-use super::selection::Selection;
+use super::selection::WaveSelection;
 use super::variables::{Declaration, Declare, Variables};
 use super::writer::{Format, WaveWriter};
 use crate::Origin;
@@ -31,7 +31,7 @@ impl<W: Write> VcdWriter<W> {
     ///
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
-    pub fn new(out: W, netlist: &Netlist, selection: &Selection) -> io::Result<Self> {
+    pub fn new(out: W, netlist: &Netlist, selection: &WaveSelection) -> io::Result<Self> {
         Self::with_origin(out, netlist, selection, Origin::default())
     }
 
@@ -42,7 +42,7 @@ impl<W: Write> VcdWriter<W> {
     pub fn with_origin(
         mut out: W,
         netlist: &Netlist,
-        selection: &Selection,
+        selection: &WaveSelection,
         origin: Origin,
     ) -> io::Result<Self> {
         let (variables, lines) = write_header(&mut out, netlist, selection, origin)?;
@@ -53,7 +53,7 @@ impl<W: Write> VcdWriter<W> {
             lines,
             stamp: Stamp::new(),
         };
-        Ok(WaveWriter::of(vcd, netlist, variables))
+        Ok(WaveWriter::from_variables(vcd, netlist, variables))
     }
 }
 
@@ -61,7 +61,7 @@ impl<W: Write> VcdWriter<W> {
 fn write_header(
     out: &mut impl Write,
     netlist: &Netlist,
-    selection: &Selection,
+    selection: &WaveSelection,
     origin: Origin,
 ) -> io::Result<(Variables, Vec<Line>)> {
     let mut header = Header {
@@ -223,7 +223,7 @@ mod tests {
         Netlist::elaborate(&m.finish().unwrap())
     }
 
-    fn writer(selection: Selection) -> VcdWriter<Vec<u8>> {
+    fn writer(selection: WaveSelection) -> VcdWriter<Vec<u8>> {
         VcdWriter::new(Vec::new(), &pair(), &selection).unwrap()
     }
 
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_header_is_exact() {
-        let text = writer(Selection::all()).finish(Time::ZERO).unwrap();
+        let text = writer(WaveSelection::all()).finish(Time::ZERO).unwrap();
         let expected = format!(
             "$version\n    femtogate {}\n$end\n{}",
             env!("CARGO_PKG_VERSION"),
@@ -282,7 +282,7 @@ $end
 
     #[test]
     fn a_selection_keeps_paths() {
-        let text = writer(Selection::all().below("second"));
+        let text = writer(WaveSelection::all().with_scope("second"));
         let text = String::from_utf8(text.finish(Time::ZERO).unwrap()).unwrap();
         let expected = "$scope module pair $end
 $scope module second $end
@@ -302,8 +302,8 @@ $upscope $end
                 .filter(|line| line.starts_with(b"$var"))
                 .count()
         };
-        let named = lines(Selection::all());
-        assert_eq!(lines(Selection::all().with_anonymous()), named + 1);
+        let named = lines(WaveSelection::all());
+        assert_eq!(lines(WaveSelection::all().with_anonymous()), named + 1);
     }
 
     #[test]
@@ -316,7 +316,7 @@ $upscope $end
             (9, "A", One),
         ];
         assert_eq!(
-            body(writer(Selection::all()), changes),
+            body(writer(WaveSelection::all()), changes),
             "0!\n#7\n1#\nz$\nbz1 \"\n#9\n1!\n#100\n"
         );
     }
@@ -332,13 +332,16 @@ $upscope $end
             (8, "Z[1]", Zero),
             (8, "Z[1]", X),
         ];
-        assert_eq!(body(writer(Selection::all()), changes), "#8\n0!\n#100\n");
+        assert_eq!(
+            body(writer(WaveSelection::all()), changes),
+            "#8\n0!\n#100\n"
+        );
     }
 
     #[test]
     fn changes_of_nets_not_selected_cost_no_line() {
         let changes = [(5, "A", One), (6, "Z[1]", One)];
-        let only = writer(Selection::all().below("second"));
+        let only = writer(WaveSelection::all().with_scope("second"));
         assert_eq!(body(only, changes), "#6\n1\"\n#100\n");
     }
 
@@ -346,9 +349,9 @@ $upscope $end
     fn a_limit_ends_the_file_there() {
         let changes = [(5, "A", One), (50, "A", Zero), (51, "A", One)];
         let until = |fs| Time::ZERO..=Time::from_fs(fs);
-        let limited = writer(Selection::all()).keep(until(50));
+        let limited = writer(WaveSelection::all()).keep(until(50));
         assert_eq!(body(limited, changes), "#5\n1!\n#50\n0!\n");
-        let limited = writer(Selection::all()).keep(until(49));
+        let limited = writer(WaveSelection::all()).keep(until(49));
         assert_eq!(body(limited, changes), "#5\n1!\n#49\n");
     }
 
@@ -356,7 +359,7 @@ $upscope $end
     fn a_kept_span_begins_with_the_values_there() {
         let span = |from, until| {
             let span = Time::from_fs(from)..=Time::from_fs(until);
-            let mut writer = writer(Selection::all()).keep(span);
+            let mut writer = writer(WaveSelection::all()).keep(span);
             let netlist = pair();
             for (fs, net, value) in [
                 (0, "A", Zero),
@@ -395,7 +398,7 @@ $upscope $end
     fn time_never_goes_back() {
         let changes = [(5, "A", One), (3, "A", Zero), (3, "Z[0]", One)];
         assert_eq!(
-            body(writer(Selection::all()), changes),
+            body(writer(WaveSelection::all()), changes),
             "#5\n0!\n1#\nbx1 \"\n#100\n"
         );
     }
@@ -417,8 +420,8 @@ $upscope $end
             }
         }
         let netlist = pair();
-        assert!(VcdWriter::new(Disk(10), &netlist, &Selection::all()).is_err());
-        let mut writer = VcdWriter::new(Disk(10_000), &netlist, &Selection::all()).unwrap();
+        assert!(VcdWriter::new(Disk(10), &netlist, &WaveSelection::all()).is_err());
+        let mut writer = VcdWriter::new(Disk(10_000), &netlist, &WaveSelection::all()).unwrap();
         let a = netlist.net("A").unwrap();
         for fs in 1..100_000 {
             writer.change(Time::from_fs(fs), a, Logic::from(fs % 2 == 0));

@@ -96,7 +96,7 @@ pub struct WaveWriter<F: Format> {
 
 impl<F: Format> WaveWriter<F> {
     /// A writer of these variables of `netlist`, which `format` has declared.
-    pub(super) fn of(format: F, netlist: &Netlist, variables: Variables) -> Self {
+    pub(super) fn from_variables(format: F, netlist: &Netlist, variables: Variables) -> Self {
         let (bus_bits_start, bus_bits) = variables.bus_bits();
         let unknown = CHARACTERS[Logic::X as usize];
         let nets: Vec<NetState> = variables

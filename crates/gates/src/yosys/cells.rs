@@ -5,7 +5,7 @@ mod library;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::{Bit, Placed, YosysError};
+use super::{Bit, CellEntry, YosysError};
 use crate::netlist::CellKind::{
     self, And2, Buf, Dffr, Dffsr, Inv, Mux2, Nand2, Nor2, Or2, Xnor2, Xor2,
 };
@@ -37,15 +37,15 @@ pub(super) struct Placing<'d> {
 }
 
 /// One cell as Yosys has it.
-struct Given<'d> {
+struct YosysCell<'d> {
     name: &'d str,
-    of: &'d Placed,
+    entry: &'d CellEntry,
     inverses: &'d HashMap<u64, u64>,
 }
 
-impl Given<'_> {
+impl YosysCell<'_> {
     fn inverse_of_q(&self) -> Option<u64> {
-        match self.of.connections.get("Q")?.as_slice() {
+        match self.entry.connections.get("Q")?.as_slice() {
             [Bit::Net(q)] => self.inverses.get(q).copied(),
             _ => None,
         }
@@ -78,20 +78,27 @@ impl<'d> Placing<'d> {
     pub(super) fn cell(
         &mut self,
         name: &str,
-        of: &Placed,
+        entry: &CellEntry,
         inverses: &HashMap<u64, u64>,
     ) -> Result<(), YosysError> {
-        if of.kind == "$scopeinfo" {
+        if entry.kind == "$scopeinfo" {
             return Ok(());
         }
-        if place(self, &Given { name, of, inverses })? {
+        if place(
+            self,
+            &YosysCell {
+                name,
+                entry,
+                inverses,
+            },
+        )? {
             Ok(())
         } else {
             Err(YosysError::Cell {
                 module: self.module.to_owned(),
                 cell: name.to_owned(),
-                kind: of.kind.clone(),
-                why: cure(&of.kind),
+                kind: entry.kind.clone(),
+                why: cure(&entry.kind),
             })
         }
     }
@@ -152,7 +159,7 @@ impl<'d> Placing<'d> {
     /// A flip-flop with reset and set, active high, where it has them.
     fn flip_flop(
         &mut self,
-        given: &Given<'_>,
+        given: &YosysCell<'_>,
         [data, clock]: [Net; 2],
         controls: [Option<Net>; 2],
         [q, qn]: [Option<Net>; 2],
@@ -176,21 +183,21 @@ impl<'d> Placing<'d> {
     /// A constant that a cell needs at a pin.
     fn constant_for(
         &mut self,
-        given: &Given<'_>,
+        given: &YosysCell<'_>,
         pin: &str,
         value: bool,
     ) -> Result<Net, YosysError> {
         self.constant(value).ok_or_else(|| YosysError::Pin {
             module: self.module.to_owned(),
             cell: given.name.to_owned(),
-            kind: given.of.kind.clone(),
+            kind: given.entry.kind.clone(),
             pin: pin.to_owned(),
             problem: "must be constant, which takes an input of the module; give it one",
         })
     }
 
-    fn pin(&mut self, given: &Given<'_>, pin: &str) -> Result<Net, YosysError> {
-        let problem = match given.of.connections.get(pin).map(Vec::as_slice) {
+    fn pin(&mut self, given: &YosysCell<'_>, pin: &str) -> Result<Net, YosysError> {
+        let problem = match given.entry.connections.get(pin).map(Vec::as_slice) {
             Some([bit]) => match self.net(bit) {
                 Some(net) => return Ok(net),
                 None => "is connected to a net that nothing drives; drive it",
@@ -201,25 +208,29 @@ impl<'d> Placing<'d> {
         Err(YosysError::Pin {
             module: self.module.to_owned(),
             cell: given.name.to_owned(),
-            kind: given.of.kind.clone(),
+            kind: given.entry.kind.clone(),
             pin: pin.to_owned(),
             problem,
         })
     }
 
-    fn pins(&mut self, given: &Given<'_>, pins: &[&'static str]) -> Result<Vec<Net>, YosysError> {
+    fn pins(
+        &mut self,
+        given: &YosysCell<'_>,
+        pins: &[&'static str],
+    ) -> Result<Vec<Net>, YosysError> {
         pins.iter().map(|&pin| self.pin(given, pin)).collect()
     }
 }
 
 /// Places the cells that do what a cell of this type does; false where there are none.
-fn place(to: &mut Placing<'_>, given: &Given<'_>) -> Result<bool, YosysError> {
-    let kind = given.of.kind.as_str();
-    if let Some(function) = &given.of.of_library {
+fn place(to: &mut Placing<'_>, given: &YosysCell<'_>) -> Result<bool, YosysError> {
+    let kind = given.entry.kind.as_str();
+    if let Some(function) = &given.entry.of_library {
         library::place(to, given, function)?;
         return Ok(true);
     }
-    if let Some(flip_flop) = FlipFlop::of(kind) {
+    if let Some(flip_flop) = FlipFlop::from_cell_kind(kind) {
         flip_flop.place(to, given)?;
         return Ok(true);
     }
@@ -293,7 +304,7 @@ pub(super) struct FlipFlop {
 
 impl FlipFlop {
     /// What the name of a cell says, if it is a flip-flop's.
-    pub(super) fn of(kind: &str) -> Option<Self> {
+    pub(super) fn from_cell_kind(kind: &str) -> Option<Self> {
         let (family, letters) = kind
             .strip_prefix("$_")?
             .strip_suffix('_')?
@@ -357,7 +368,7 @@ impl FlipFlop {
         })
     }
 
-    fn place(&self, to: &mut Placing<'_>, given: &Given<'_>) -> Result<(), YosysError> {
+    fn place(&self, to: &mut Placing<'_>, given: &YosysCell<'_>) -> Result<(), YosysError> {
         let mut data = to.pin(given, "D")?;
         let q = to.pin(given, "Q")?;
         let qn = given.inverse_of_q().and_then(|n| to.nets.get(&n).copied());
@@ -412,7 +423,7 @@ impl FlipFlop {
     fn enabled(
         &self,
         to: &mut Placing<'_>,
-        given: &Given<'_>,
+        given: &YosysCell<'_>,
         data: Net,
         q: Net,
     ) -> Result<Net, YosysError> {

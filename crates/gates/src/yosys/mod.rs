@@ -33,35 +33,38 @@ use error::in_words;
 const MOST_BYTES: usize = 16 << 20;
 
 /// The entries of a JSON object in their order.
-struct Listed<T>(Vec<(String, T)>);
+struct OrderedEntries<T>(Vec<(String, T)>);
 
-impl<T> Default for Listed<T> {
+impl<T> Default for OrderedEntries<T> {
     fn default() -> Self {
-        Listed(Vec::new())
+        OrderedEntries(Vec::new())
     }
 }
 
-impl<T> Listed<T> {
+impl<T> OrderedEntries<T> {
     fn get(&self, name: &str) -> Option<&T> {
         let mut entries = self.0.iter();
         entries.find(|(known, _)| known == name).map(|(_, it)| it)
     }
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Listed<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for OrderedEntries<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Entries<T>(PhantomData<T>);
         impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
-            type Value = Listed<T>;
+            type Value = OrderedEntries<T>;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 write!(f, "an object")
             }
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Listed<T>, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(
+                self,
+                mut map: A,
+            ) -> Result<OrderedEntries<T>, A::Error> {
                 let mut entries = Vec::new();
                 while let Some(entry) = map.next_entry()? {
                     entries.push(entry);
                 }
-                Ok(Listed(entries))
+                Ok(OrderedEntries(entries))
             }
         }
         deserializer.deserialize_map(Entries(PhantomData))
@@ -70,19 +73,19 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Listed<T> {
 
 #[derive(Deserialize)]
 struct Design {
-    modules: Listed<Described>,
+    modules: OrderedEntries<YosysModule>,
 }
 
 #[derive(Deserialize)]
-struct Described {
+struct YosysModule {
     #[serde(default)]
-    attributes: Listed<serde_json::Value>,
+    attributes: OrderedEntries<serde_json::Value>,
     #[serde(default)]
-    ports: Listed<PortBits>,
+    ports: OrderedEntries<PortBits>,
     #[serde(default)]
-    cells: Listed<Placed>,
+    cells: OrderedEntries<CellEntry>,
     #[serde(default)]
-    netnames: Listed<Named>,
+    netnames: OrderedEntries<NetName>,
 }
 
 #[derive(Deserialize)]
@@ -92,19 +95,19 @@ struct PortBits {
 }
 
 #[derive(Deserialize)]
-struct Placed {
+struct CellEntry {
     /// What it does, where it is a library's.
     #[serde(skip)]
     of_library: Option<CellFunction>,
     #[serde(rename = "type")]
     kind: String,
     #[serde(default)]
-    port_directions: Listed<String>,
-    connections: Listed<Vec<Bit>>,
+    port_directions: OrderedEntries<String>,
+    connections: OrderedEntries<Vec<Bit>>,
 }
 
 #[derive(Deserialize)]
-struct Named {
+struct NetName {
     #[serde(default)]
     hide_name: u32,
     bits: Vec<Bit>,
@@ -149,8 +152,8 @@ impl Module {
                 .and_then(|library| library.function(&cell.kind))
                 .cloned();
         }
-        let is_top = |of: &Described| {
-            let top = of.attributes.get("top").map(ToString::to_string);
+        let is_top = |module: &YosysModule| {
+            let top = module.attributes.get("top").map(ToString::to_string);
             top.is_some_and(|value| value.contains('1'))
         };
         let names = || modules.iter().map(|(name, _)| name.clone()).collect();
@@ -172,7 +175,7 @@ impl Module {
     }
 }
 
-impl Described {
+impl YosysModule {
     fn build(&self, name: &str) -> Result<Arc<Module>, YosysError> {
         let driven = self.drivers(name)?;
         let mut m = ModuleBuilder::new(name);
@@ -213,7 +216,7 @@ impl Described {
             }
         }
         let mut taken: HashSet<&str> = self.ports.0.iter().map(|(port, _)| &**port).collect();
-        for (net, Named { hide_name, bits }) in &self.netnames.0 {
+        for (net, NetName { hide_name, bits }) in &self.netnames.0 {
             let numbers = bits.iter().map(|bit| match bit {
                 Bit::Net(n) if driven.contains_key(n) && !nets.contains_key(n) => Some(*n),
                 _ => None,
@@ -238,7 +241,8 @@ impl Described {
                 }
             }
         }
-        let kinds: HashMap<&str, &Placed> = self.cells.0.iter().map(|(n, of)| (&**n, of)).collect();
+        let kinds: HashMap<&str, &CellEntry> =
+            self.cells.0.iter().map(|(n, of)| (&**n, of)).collect();
         let inverses = self.cells.0.iter().filter_map(|(_, of)| {
             let (from, to) = of.inverts()?;
             let driver = kinds.get(driven.get(&from)?)?;
@@ -322,9 +326,9 @@ fn is_ours(name: &str) -> bool {
     number.is_some_and(|digits| digits.bytes().all(|b| b.is_ascii_digit()))
 }
 
-impl Placed {
+impl CellEntry {
     fn is_flip_flop(&self) -> bool {
-        FlipFlop::of(&self.kind).is_some()
+        FlipFlop::from_cell_kind(&self.kind).is_some()
     }
 
     /// The nets of an inverter.

@@ -11,7 +11,7 @@ use crate::units::Time;
 /// A module `m` of one cell, whose pins are ports of its own names.
 fn cell(kind: &str, inputs: &[&str], output: &str) -> String {
     let all: Vec<&str> = inputs.iter().copied().chain([output]).collect();
-    let of = |entry: &dyn Fn(usize, &str) -> String| -> String {
+    let joined = |entry: &dyn Fn(usize, &str) -> String| -> String {
         let entries: Vec<String> = all
             .iter()
             .enumerate()
@@ -19,11 +19,11 @@ fn cell(kind: &str, inputs: &[&str], output: &str) -> String {
             .collect();
         entries.join(", ")
     };
-    let ports = of(&|i, pin| {
+    let ports = joined(&|i, pin| {
         let direction = if pin == output { "output" } else { "input" };
         format!(r#""{pin}": {{"direction": "{direction}", "bits": [{i}]}}"#)
     });
-    let pins = of(&|i, pin| format!(r#""{pin}": [{i}]"#));
+    let pins = joined(&|i, pin| format!(r#""{pin}": [{i}]"#));
     let cell = format!(r#"{{"type": "{kind}", "connections": {{{pins}}}}}"#);
     format!(r#"{{"modules": {{"m": {{"ports": {{{ports}}}, "cells": {{"it": {cell}}}}}}}}}"#)
 }
@@ -35,10 +35,10 @@ struct Bench {
 
 impl Bench {
     fn new(text: &str) -> Self {
-        Self::of(text, None)
+        Self::from_text(text, None)
     }
 
-    fn of(text: &str, library: Option<&Liberty>) -> Self {
+    fn from_text(text: &str, library: Option<&Liberty>) -> Self {
         let module = Module::from_yosys_of(text, None, library).unwrap();
         let netlist = Netlist::elaborate(&module);
         let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
@@ -170,14 +170,14 @@ fn flip_flops_do_what_their_names_say() {
             bench.set(&first, "Q");
             // What the state becomes; `before` is that of the last step.
             let step = |state, before: &HashMap<&str, bool>, values: &HashMap<&str, bool>| {
-                let of = |pin: &str, values: &HashMap<&str, bool>| {
+                let is_active = |pin: &str, values: &HashMap<&str, bool>| {
                     let at = pins.find(pin)?;
                     Some(values[pin] == high(at))
                 };
-                let is = |pin| of(pin, values).unwrap_or(false);
-                let is_enabled = of("E", values).unwrap_or(true);
+                let is = |pin| is_active(pin, values).unwrap_or(false);
+                let is_enabled = is_active("E", values).unwrap_or(true);
                 let to = Some(pins.find('0').is_some_and(high));
-                let rises = !of("C", before).unwrap() && of("C", values).unwrap();
+                let rises = !is_active("C", before).unwrap() && is_active("C", values).unwrap();
                 let is_sync = family.starts_with('S');
                 if is("L") {
                     Some(values["AD"])
@@ -277,7 +277,7 @@ fn cells_of_a_library_do_what_it_says() {
     let library = &library();
     for (kind, pins, law) in gates {
         let output = if kind == "NAND2_4" { "Y" } else { "Z" };
-        let mut bench = Bench::of(&cell(kind, pins, output), Some(library));
+        let mut bench = Bench::from_text(&cell(kind, pins, output), Some(library));
         for bits in 0..1u32 << pins.len() {
             let values: Vec<bool> = (0..pins.len()).map(|pin| bits >> pin & 1 == 1).collect();
             let inputs: Vec<_> = pins.iter().copied().zip(values.iter().copied()).collect();
@@ -290,7 +290,8 @@ fn cells_of_a_library_do_what_it_says() {
         }
     }
     for (output, inverts) in [("Q", false), ("QN", true)] {
-        let mut bench = Bench::of(&cell("DFFNS_1", &["CKN", "D", "SN"], output), Some(library));
+        let mut bench =
+            Bench::from_text(&cell("DFFNS_1", &["CKN", "D", "SN"], output), Some(library));
         let mut is = |inputs: &[(&str, bool)], state: bool| {
             let wanted = if state != inverts {
                 Logic::One

@@ -6,7 +6,7 @@ use std::io::Cursor;
 use femtogate::kernel::{Activity, Kernel, Stimulus};
 use femtogate::netlist::Netlist;
 use femtogate::units::Time;
-use femtogate::waves::{Selection, VcdWriter};
+use femtogate::waves::{VcdWriter, WaveSelection};
 use proptest::prelude::*;
 
 use crate::every_edge::circuit::{self, Case};
@@ -17,7 +17,7 @@ fn random_circuit(case: &Case) -> Result<(), TestCaseError> {
     let netlist = Netlist::elaborate(&case.circuit());
     let drives = case.drives(&netlist);
     let end = drives.last().map_or(Time::ZERO, |d| d.time) + Time::from_ns(2);
-    let all = Selection::all().with_anonymous();
+    let all = WaveSelection::all().with_anonymous();
     let mut dump = VcdWriter::new(Vec::new(), &netlist, &all).unwrap();
     let mut activity = Activity::new(&netlist, Time::ZERO);
     let timing = case.timing(&netlist);

@@ -44,7 +44,7 @@ fn run(folder: &Path, program: &str, arguments: &[&str]) -> String {
 pub fn random_delays(netlist: &Netlist, nominal: &Timing, random: &mut StdRng) -> Timing {
     let mut timing = nominal.clone();
     for cell in 0..netlist.cells().len() {
-        let mut delays = *nominal.of(cell);
+        let mut delays = *nominal.cell_delays(cell);
         for arc in delays.as_flattened_mut() {
             arc.rise_fs = (arc.rise_fs as f64 * random.random_range(0.7..1.4)) as u32;
             arc.fall_fs = (arc.fall_fs as f64 * random.random_range(0.7..1.4)) as u32;

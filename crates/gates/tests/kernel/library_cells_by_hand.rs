@@ -2,7 +2,7 @@
 //! leakage by hand.
 
 use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
-use femtogate::liberty::{Characterised, Environment, Liberty};
+use femtogate::liberty::{CharacterisedNetlist, Environment, Liberty};
 use femtogate::logic::Logic;
 use femtogate::netlist::{CellKind, CheckKind, Control, Edge, ModuleBuilder, Netlist};
 use femtogate::units::Time;
@@ -23,7 +23,7 @@ fn text() -> String {
 }
 
 /// One cell with its inputs A, B … and its output Z; and its slew at the inputs, ns.
-fn alone(library: &Liberty, kind: CellKind) -> (Netlist, Characterised, f64) {
+fn alone(library: &Liberty, kind: CellKind) -> (Netlist, CharacterisedNetlist, f64) {
     let mut m = ModuleBuilder::new("alone");
     let names = ["A", "B", "C", "D"];
     let inputs: Vec<_> = kind
@@ -36,7 +36,7 @@ fn alone(library: &Liberty, kind: CellKind) -> (Netlist, Characterised, f64) {
     m.gate_into(kind, &inputs, z);
     let netlist = Netlist::elaborate(&m.finish().unwrap());
     let environment = Environment::new(library);
-    let made = Characterised::new(&netlist, library, &environment);
+    let made = CharacterisedNetlist::new(&netlist, library, &environment);
     (netlist, made, environment.input_slew_fs * 1e-6)
 }
 
@@ -114,9 +114,9 @@ fn limits_of_a_flip_flop() {
     let netlist = Netlist::elaborate(&m.finish().unwrap());
     let environment = Environment::new(&library);
     let slew = environment.input_slew_fs * 1e-6;
-    let made = Characterised::new(&netlist, &library, &environment);
+    let made = CharacterisedNetlist::new(&netlist, &library, &environment);
     let limits = made.timing.limits(0, CellKind::Dffr);
-    let limit = |kind, edge| limits.at(Control::Reset, kind, edge);
+    let limit = |kind, edge| limits.limit_fs(Control::Reset, kind, edge);
     for (kind, [rise_fs, fall_fs]) in [
         (CheckKind::Setup, [25_000, 30_000]),
         (CheckKind::Hold, [4_000, 2_000]),
@@ -157,7 +157,7 @@ fn energies_of_two_inverters() {
         m.gate_into(CellKind::Inv, &[between], z);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let environment = Environment::new(library);
-        let made = Characterised::new(&netlist, library, &environment);
+        let made = CharacterisedNetlist::new(&netlist, library, &environment);
         let [within, loads] = made.energy_j((&netlist, 0), library, 2.0, |_| 10.0);
         (within, loads, environment.input_slew_fs * 1e-6)
     };

@@ -4,7 +4,7 @@
 use crate::tool;
 
 use femtogate::liberty::{
-    Characterised, Clocking, Environment, Liberty, write_constraints, write_mapped,
+    CharacterisedNetlist, Clocking, Environment, Liberty, write_constraints, write_mapped,
     write_mapped_cells, write_mapped_sdf,
 };
 use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
@@ -34,7 +34,7 @@ fn small() -> Netlist {
 fn files(text: &str) -> [String; 4] {
     let library = Liberty::read(text, &[]).unwrap_or_else(|e| panic!("{}: {e}", e.line));
     let (netlist, environment) = (small(), Environment::new(&library));
-    let made = Characterised::new(&netlist, &library, &environment);
+    let made = CharacterisedNetlist::new(&netlist, &library, &environment);
     let mut files: [Vec<u8>; 4] = Default::default();
     let [verilog, models, sdf, sdc] = &mut files;
     write_mapped(verilog, &netlist, &library, &made).unwrap();
@@ -145,8 +145,8 @@ fn capacitance_of_outputs_is_a_load() {
             slowest_slew_fs: 1e9,
             wire_ff: 0.0,
         };
-        let made = Characterised::new(&netlist, &library, &environment);
-        let arc = made.timing.of(0)[0][0];
+        let made = CharacterisedNetlist::new(&netlist, &library, &environment);
+        let arc = made.timing.cell_delays(0)[0][0];
         [arc.rise_fs, arc.fall_fs].map(f64::from)
     };
     let before = delays(&text());
@@ -165,7 +165,7 @@ fn the_extremes_of_delays_are_those_of_the_tables() {
     let extremes = |text: &str| {
         let library = Liberty::read(text, &[]).unwrap();
         let (netlist, environment) = (small(), Environment::new(&library));
-        let made = Characterised::new(&netlist, &library, &environment);
+        let made = CharacterisedNetlist::new(&netlist, &library, &environment);
         made.extreme_delays(&netlist, &library)
     };
     let [(shortest, _), (longest, of_longest)] = extremes(&text());

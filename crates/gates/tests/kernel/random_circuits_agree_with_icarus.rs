@@ -31,7 +31,7 @@ use femtogate::netlist::{Corner, Netlist, Timing};
 use femtogate::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use femtogate::units::Time;
 use femtogate::verilog::{write_cells, write_delays, write_modules, write_parametric_cells};
-use femtogate::waves::{Selection, VcdWriter};
+use femtogate::waves::{VcdWriter, WaveSelection};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, FileFailurePersistence, TestCaseError, TestError, TestRunner};
 use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
@@ -55,7 +55,7 @@ fn simulate(
     netlist: &Netlist,
     drives: Vec<Drive>,
     end: Time,
-    selection: &Selection,
+    selection: &WaveSelection,
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
     let mut kernel = Kernel::new(netlist, timing);
@@ -77,13 +77,13 @@ fn through_sdf(drawn: &Timing, timing: &Timing, netlist: &Netlist, corner: Corne
 }
 
 /// One of the cases that Icarus simulates at once: its Verilog, whose modules end in `_{index}`, and our waves until `end`.
-struct Prepared {
+struct IcarusCase {
     verilog: String,
     ours: Waves,
     end: Time,
 }
 
-fn prepared(case: &Case, index: usize) -> Prepared {
+fn prepared(case: &Case, index: usize) -> IcarusCase {
     let top = case.circuit();
     let netlist = Netlist::elaborate(&top);
     let drives = case.drives(&netlist);
@@ -111,8 +111,8 @@ fn prepared(case: &Case, index: usize) -> Prepared {
     let parameters = String::from_utf8(parameters).unwrap();
     let bench = testbench(&top, &netlist, &drives, &parameters);
     let verilog = String::from_utf8(verilog).unwrap() + &bench;
-    let selection = Selection::all().with_anonymous();
-    Prepared {
+    let selection = WaveSelection::all().with_anonymous();
+    IcarusCase {
         verilog: with_modules_numbered(&verilog, index),
         ours: simulate(&ours, &netlist, drives, end, &selection),
         end,
@@ -245,7 +245,7 @@ fn compare_shuffled(case: &Case, seed: u64) -> Result<Figures, TestCaseError> {
     shuffled.shuffle(random);
     shuffled.sort_by_key(|drive| drive.time);
     // Numbers of unnamed nets depend on the order, too.
-    let named = Selection::all();
+    let named = WaveSelection::all();
     let timing = netlists.each_ref().map(|netlist| case.timing(netlist));
     let waves = simulate(&timing[0], &netlists[0], drives, end, &named);
     let shuffled = simulate(&timing[1], &netlists[1], shuffled, end, &named);

@@ -146,7 +146,7 @@ fn latched(state: Logic, [data, clock, reset, set]: [Logic; 4], clock_before: Lo
             .into_iter()
             .flat_map(|b| may_be(clock).into_iter().map(move |n| (b, n)))
         {
-            let rises = clock.seen() != clock_before.seen() && !before && now;
+            let rises = clock.as_gate_input() != clock_before.as_gate_input() && !before && now;
             let clocked = if rises { data } else { state };
             let values = match (reset, set) {
                 (true, _) => vec![false],
@@ -163,11 +163,11 @@ fn latched(state: Logic, [data, clock, reset, set]: [Logic; 4], clock_before: Lo
 }
 
 /// Pulses of each net that are shorter than its driver's delay: each cell by itself, from the waves at its pins.
-fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64> {
+fn inertial_glitches(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64> {
     let mut pulses = vec![0; of_net.len()];
     for (index, cell) in netlist.cells().iter().enumerate() {
         let pins: Vec<NetId> = cell.input_nets().collect();
-        let at = |net: NetId, time: i64| {
+        let net_value = |net: NetId, time: i64| {
             let changes = &of_net[net.index()];
             let until = changes.partition_point(|change| change.0 <= time);
             until.checked_sub(1).map_or(Logic::X, |k| changes[k].1)
@@ -181,7 +181,8 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
             let mut last = Logic::X;
             let mut on_their_way: Vec<(i64, Logic)> = Vec::new();
             for &time in &times {
-                let value = |pin: usize, time| pins.get(pin).map_or(Logic::Zero, |&p| at(p, time));
+                let value =
+                    |pin: usize, time| pins.get(pin).map_or(Logic::Zero, |&p| net_value(p, time));
                 let now = [0, 1, 2, 3].map(|pin| value(pin, time));
                 let next = match (cell.kind.is_flip_flop(), which) {
                     (false, _) => cell.kind.output(now),
@@ -197,7 +198,8 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
                 let causes = (0..pins.len()).filter(|&pin| {
                     cell.kind.triggers(pin) && !is_fall(pin) && now[pin] != value(pin, time - 1)
                 });
-                let delays = causes.map(|pin| i64::from(timing.of(index)[pin][which].to(next)));
+                let delays = causes
+                    .map(|pin| i64::from(timing.cell_delays(index)[pin][which].delay_fs(next)));
                 let due = time + delays.min().unwrap();
                 on_their_way.retain(|&(arrives, _)| arrives > time);
                 let stays = match timing.model(index) {
@@ -205,7 +207,9 @@ fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64>
                     DelayModel::Transport => on_their_way.partition_point(|&(t, _)| t < due),
                 };
                 let dropped = on_their_way.split_off(stays);
-                let before = on_their_way.last().map_or(at(output, time), |&(_, v)| v);
+                let before = on_their_way
+                    .last()
+                    .map_or(net_value(output, time), |&(_, v)| v);
                 let values: Vec<Logic> = [before]
                     .into_iter()
                     .chain(dropped.into_iter().map(|(_, value)| value))
@@ -246,7 +250,7 @@ pub fn compare(
     let inputs = netlist.inputs();
     let input_changes = inputs.iter().flat_map(|input| &of_net[input.index()]);
     let input_changes = input_changes.map(|change| change.0).collect();
-    let swallowed = swallowed(netlist, timing, &of_net);
+    let swallowed = inertial_glitches(netlist, timing, &of_net);
     for (path, net, changes) in &bits {
         let row = nets.get(path);
         prop_assert!(row.is_some(), "{} is in no list", path);
@@ -265,7 +269,7 @@ pub fn saif(netlist: &Netlist, activity: &Activity, end: Time) -> String {
     write_saif(
         &mut text,
         netlist,
-        &activity.until(end),
+        &activity.net_activity(end),
         end,
         true,
         femtogate::Origin::default(),

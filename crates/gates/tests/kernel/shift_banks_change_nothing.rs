@@ -63,13 +63,13 @@ fn values(
         kernel = kernel.shuffled(seed);
     }
     let mut stimulus = Stimulus::sorted(drives);
-    let at = |&time: &Time| {
+    let values_after = |&time: &Time| {
         kernel.run(&mut stimulus, time, &mut ()).unwrap();
         let nets = (0..netlist.net_count()).map(NetId::new);
         let values = nets.map(|net| kernel.value(net));
         (values.collect(), kernel.statistics().changes)
     };
-    times.iter().map(at).collect()
+    times.iter().map(values_after).collect()
 }
 
 proptest! {

@@ -24,8 +24,8 @@ fn events(trace: &Recorder, net: NetId) -> Vec<(i64, Logic, Logic)> {
     let mut values: Vec<(i64, Logic)> = vec![(i64::MIN, X)];
     for (time, _, value) in trace.changes().iter().filter(|(_, n, _)| *n == net) {
         match values.last_mut() {
-            Some(last) if last.0 == time.as_fs() => last.1 = value.seen(),
-            _ => values.push((time.as_fs(), value.seen())),
+            Some(last) if last.0 == time.as_fs() => last.1 = value.as_gate_input(),
+            _ => values.push((time.as_fs(), value.as_gate_input())),
         }
     }
     let pairs = values.windows(2);
@@ -65,7 +65,7 @@ fn reference(
     let mut found = Vec::new();
     let mut check =
         |which: CheckKind, name: &str, edge: Edge, completing: &[i64], since: &[i64]| {
-            let limit = i64::from(limits.toward(which, edge, Corner::Typ));
+            let limit = i64::from(limits.edge_limit_fs(which, edge, Corner::Typ));
             for &time in completing.iter().filter(|t| !is_held(**t)) {
                 let Some(&from) = since.iter().rfind(|s| **s <= time) else {
                     continue;
@@ -142,7 +142,7 @@ fn limits(fs: [u32; 9]) -> CheckLimits {
 }
 
 /// Every flip-flop's violations in `report` are those of the definitions.
-fn judged(
+fn check_violations(
     netlist: &Netlist,
     report: &CheckReport,
     trace: &Recorder,
@@ -197,7 +197,7 @@ fn judge_netlist(
         )
         .unwrap();
     let report = checks.report(&netlist);
-    judged(&netlist, &report, &trace, limits)?;
+    check_violations(&netlist, &report, &trace, limits)?;
     Ok(CheckKind::ALL.map(|kind| {
         let summary = report.summary(kind);
         [summary.checked, summary.violated]
@@ -271,6 +271,6 @@ proptest! {
             .map(|(time, pin, value)| (time, pins[pin % pins.len()], Logic::ALL[value]))
             .collect();
         let (report, trace, _) = simulate(&netlist, &library, Corner::Typ, policy, &script);
-        judged(&netlist, &report, &trace, &limits)?;
+        check_violations(&netlist, &report, &trace, &limits)?;
     }
 }

@@ -17,7 +17,7 @@ use femtogate::netlist::{
     CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist, Timing, TimingArc,
 };
 use femtogate::units::Time;
-use femtogate::waves::{FstWriter, Selection, VcdWriter};
+use femtogate::waves::{FstWriter, VcdWriter, WaveSelection};
 use proptest::prelude::*;
 
 /// Times (fs) and values of one signal, first the initial one.
@@ -141,7 +141,7 @@ fn coarse_library() -> Library {
 }
 
 /// The files of a simulation, what they keep of it, and every change of every net in it.
-struct Simulated {
+struct SimulatedWaves {
     vcd: String,
     fst: Vec<u8>,
     span: RangeInclusive<u64>,
@@ -154,10 +154,10 @@ fn simulate(
     library: &Library,
     drives: Vec<Drive>,
     kept: Option<(i64, i64)>,
-) -> Simulated {
+) -> SimulatedWaves {
     let end = drives.last().unwrap().time + Time::from_ns(3);
     let mut stimulus = Stimulus::new(drives);
-    let selection = Selection::all().with_anonymous();
+    let selection = WaveSelection::all().with_anonymous();
     let mut vcd = VcdWriter::new(Vec::new(), netlist, &selection).unwrap();
     let mut fst = FstWriter::new(Cursor::new(Vec::new()), netlist, &selection).unwrap();
     let mut span = Time::ZERO..=end;
@@ -176,7 +176,7 @@ fn simulate(
     let fst = fst.finish(end).unwrap().into_inner();
     assert!(vcd.ends_with('\n'));
     let span = span.start().as_fs() as u64..=span.end().as_fs() as u64;
-    Simulated {
+    SimulatedWaves {
         vcd,
         fst,
         span,
@@ -185,7 +185,7 @@ fn simulate(
 }
 
 /// What a file should say of `nets` (bit 0 first): their value where it begins, then one per instant, and only changes.
-fn expected(simulated: &Simulated, nets: &[NetId]) -> Changes {
+fn expected(simulated: &SimulatedWaves, nets: &[NetId]) -> Changes {
     let (recorder, span) = (&simulated.recorder, &simulated.span);
     let mut values: HashMap<NetId, Logic> = nets.iter().map(|&n| (n, Logic::X)).collect();
     let text = |values: &HashMap<NetId, Logic>| -> String {
@@ -243,7 +243,7 @@ fn signals(netlist: &Netlist) -> Vec<(Vec<String>, bool, Vec<NetId>)> {
 }
 
 /// Checks a file with Surfer's reader.
-fn check_with_wellen(file: &[u8], netlist: &Netlist, simulated: &Simulated) {
+fn check_with_wellen(file: &[u8], netlist: &Netlist, simulated: &SimulatedWaves) {
     let mut waves = wellen::simple::read_from_reader(Cursor::new(file.to_owned())).unwrap();
     let first = *waves.time_table().first().unwrap();
     assert_eq!(first, *simulated.span.start(), "the file begins elsewhere");
@@ -314,7 +314,7 @@ fn lines(text: &str) -> (vcd::Header, HashMap<vcd::IdCode, Changes>) {
 }
 
 /// Checks the VCD with the `vcd` crate's reader, which reports every line.
-fn check_with_vcd(netlist: &Netlist, simulated: &Simulated) {
+fn check_with_vcd(netlist: &Netlist, simulated: &SimulatedWaves) {
     let (header, lines) = lines(&simulated.vcd);
     for (path, _, nets) in signals(netlist) {
         let var = header.find_var(&path).expect("every signal is declared");
@@ -324,7 +324,7 @@ fn check_with_vcd(netlist: &Netlist, simulated: &Simulated) {
 }
 
 /// Path, type, width, range and changes of every variable, in the order of the file.
-type Declared = Vec<(
+type DeclaredSignals = Vec<(
     String,
     vcd::VarType,
     u32,
@@ -332,12 +332,12 @@ type Declared = Vec<(
     Changes,
 )>;
 
-fn declared(text: &str) -> Declared {
+fn declared(text: &str) -> DeclaredSignals {
     fn add(
         items: &[vcd::ScopeItem],
         path: &str,
         lines: &HashMap<vcd::IdCode, Changes>,
-        all: &mut Declared,
+        all: &mut DeclaredSignals,
     ) {
         for item in items {
             match item {
@@ -361,7 +361,7 @@ fn declared(text: &str) -> Declared {
 }
 
 /// Checks the FST file with GTKWave's own converter, where there is one.
-fn check_with_fst2vcd(simulated: &Simulated) {
+fn check_with_fst2vcd(simulated: &SimulatedWaves) {
     static SKIPPED: Once = Once::new();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.fst");

@@ -22,7 +22,7 @@ pub fn read_array<T: Element>(path: &Path, shape: &[usize]) -> Result<Vec<T>, In
         Err(other())
     };
     let numbers = numbers.map_err(|e| broken(path, &e))?;
-    Ok(numbers.into_iter().filter_map(T::of).collect())
+    Ok(numbers.into_iter().filter_map(T::from_number).collect())
 }
 
 /// Reads an array of this shape, row-major, whose elements are whole numbers from 0 to 65535 of any type; the last three axes are rows,

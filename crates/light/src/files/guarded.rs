@@ -25,22 +25,22 @@ type FileId = (u64, u64);
 type FileId = PathBuf;
 
 #[derive(Debug)]
-struct Guarded {
+struct InputGuard {
     /// With the name by which each was opened.
     inputs: BTreeMap<FileId, PathBuf>,
     sentences: Vec<String>,
 }
 
 /// Nothing for a library: a long-lived process may write what it once read.
-static GUARDED: Mutex<Option<Guarded>> = Mutex::new(None);
+static GUARDED: Mutex<Option<InputGuard>> = Mutex::new(None);
 
-fn guarded() -> MutexGuard<'static, Option<Guarded>> {
+fn guarded() -> MutexGuard<'static, Option<InputGuard>> {
     GUARDED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// From now on, files that this process reads are not replaced. For `main` alone.
 pub fn guard_inputs() {
-    guarded().get_or_insert(Guarded {
+    guarded().get_or_insert(InputGuard {
         inputs: BTreeMap::new(),
         sentences: Vec::new(),
     });
@@ -248,23 +248,23 @@ mod tests {
     #[test]
     fn what_is_not_ours_gets_another_name_and_nothing_is_lost() {
         let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name);
+        let path = |name: &str| dir.path().join(name);
         let put_aside = |path: &Path| set_aside_foreign(path, begins_with("ours"));
-        put_aside(&at("absent.log")).unwrap();
+        put_aside(&path("absent.log")).unwrap();
 
-        fs::write(at("a.log"), "ours").unwrap();
-        put_aside(&at("a.log")).unwrap();
-        assert!(at("a.log").exists());
+        fs::write(path("a.log"), "ours").unwrap();
+        put_aside(&path("a.log")).unwrap();
+        assert!(path("a.log").exists());
 
         for (content, kept) in [("first", "a.kept.log"), ("second", "a.kept-2.log")] {
-            fs::write(at("a.log"), content).unwrap();
-            put_aside(&at("a.log")).unwrap();
-            assert!(!at("a.log").exists());
-            assert_eq!(fs::read_to_string(at(kept)).unwrap(), content);
+            fs::write(path("a.log"), content).unwrap();
+            put_aside(&path("a.log")).unwrap();
+            assert!(!path("a.log").exists());
+            assert_eq!(fs::read_to_string(path(kept)).unwrap(), content);
         }
 
-        fs::create_dir(at("b.log")).unwrap();
-        assert!(put_aside(&at("b.log")).is_err());
+        fs::create_dir(path("b.log")).unwrap();
+        assert!(put_aside(&path("b.log")).is_err());
     }
 
     #[cfg(unix)]
@@ -287,14 +287,14 @@ mod tests {
     fn what_may_never_end_is_not_opened() {
         use std::os::unix::fs::symlink;
         let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name);
+        let path = |name: &str| dir.path().join(name);
         let made = std::process::Command::new("mkfifo")
-            .arg(at("pipe"))
+            .arg(path("pipe"))
             .status();
         assert!(made.unwrap().success());
-        symlink(at("pipe"), at("link")).unwrap();
-        symlink("/dev/zero", at("zero")).unwrap();
-        let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        symlink(path("pipe"), path("link")).unwrap();
+        symlink("/dev/zero", path("zero")).unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(path("socket")).unwrap();
         for (name, says) in [
             ("pipe", "is a named pipe"),
             ("link", "is a named pipe"),
@@ -302,10 +302,10 @@ mod tests {
             ("socket", "is a socket"),
             ("", "is a folder"),
         ] {
-            let refused = open_file(&at(name)).unwrap_err().to_string();
+            let refused = open_file(&path(name)).unwrap_err().to_string();
             assert!(refused.contains(says), "{refused}");
         }
-        fs::write(at("file"), "").unwrap();
-        assert!(open_file(&at("file")).is_ok());
+        fs::write(path("file"), "").unwrap();
+        assert!(open_file(&path("file")).is_ok());
     }
 }

@@ -186,7 +186,7 @@ impl<R: BufRead> Lines<R> {
             } else {
                 0
             };
-            let complain = |message| Err(InputError::at(&self.source, self.number, message));
+            let complain = |message| Err(InputError::at_line(&self.source, self.number, message));
             if let Some(message) = flaw(&self.bytes, is_first) {
                 return complain(message);
             }
@@ -210,7 +210,7 @@ impl<R: BufRead> Lines<R> {
                 Ok(line) => Ok(Some((self.number, line.trim()))),
                 Err(_) => {
                     let message = "ends within a character; give a whole text file, saved as UTF-8";
-                    Err(InputError::at(&self.source, self.number, message))
+                    Err(InputError::at_line(&self.source, self.number, message))
                 }
             };
         }
@@ -254,8 +254,8 @@ pub fn parse_toml<T: DeserializeOwned>(
         };
         match e.span() {
             Some(span) => {
-                let line = LineEnds::of(text).line_of(span.start);
-                InputError::at(source, line, message)
+                let line = LineEnds::new(text).line_of(span.start);
+                InputError::at_line(source, line, message)
             }
             None => InputError::new(source, message),
         }
@@ -276,7 +276,7 @@ pub fn parse_json<T: DeserializeOwned>(
             return InputError::new(source, format!("is empty; give {wanted}"));
         }
         let said = e.to_string();
-        let what = match Misfit::of(&said) {
+        let what = match Misfit::from_message(&said) {
             Some(misfit) => misfit.without_cure(),
             None if e.is_data() => match wrong_name(without_place(&said)) {
                 Some((what, _)) => what,
@@ -285,7 +285,7 @@ pub fn parse_json<T: DeserializeOwned>(
             None if e.is_eof() => "the text ends early".to_owned(),
             None => "this is no JSON".to_owned(),
         };
-        InputError::at(source, e.line(), format!("{what}; give {wanted}"))
+        InputError::at_line(source, e.line(), format!("{what}; give {wanted}"))
     })
 }
 
@@ -294,7 +294,7 @@ pub fn parse_json<T: DeserializeOwned>(
 pub struct LineEnds(Vec<usize>);
 
 impl LineEnds {
-    pub(crate) fn of(text: &str) -> Self {
+    pub(crate) fn new(text: &str) -> Self {
         LineEnds(text.match_indices('\n').map(|(at, _)| at).collect())
     }
 
@@ -337,7 +337,7 @@ mod tests {
         #[test]
         fn a_byte_is_in_the_line_after_as_many_ends(text in "[a\n€]{0,40}", offset in 0usize..100) {
             let ends = text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
-            prop_assert_eq!(LineEnds::of(&text).line_of(offset), 1 + ends);
+            prop_assert_eq!(LineEnds::new(&text).line_of(offset), 1 + ends);
         }
     }
 

@@ -192,7 +192,7 @@ impl JournalReader {
     ///
     /// # Errors
     /// When it cannot be read.
-    pub fn at(&mut self, begin: u64) -> Result<Option<&str>, InputError> {
+    pub fn read_line_at(&mut self, begin: u64) -> Result<Option<&str>, InputError> {
         let by = begin as i64 - self.at as i64;
         let moved = self.reader.seek_relative(by);
         moved.map_err(|e| InputError::unreadable(&self.path, &e))?;
@@ -294,9 +294,9 @@ mod tests {
             .step_by(7)
             .chain(places.iter().zip(&lines))
         {
-            assert_eq!(reader.at(*place).unwrap(), Some(line.as_str()));
+            assert_eq!(reader.read_line_at(*place).unwrap(), Some(line.as_str()));
         }
-        assert_eq!(reader.at(3).unwrap(), None);
+        assert_eq!(reader.read_line_at(3).unwrap(), None);
     }
 
     #[test]

@@ -33,7 +33,7 @@ impl fmt::Display for Misfit {
 /// What a reader says of an entry, with a cure and without Rust's types.
 pub fn in_plain_words(said: &str) -> String {
     let said = said.trim().replace('\n', " ");
-    match Misfit::of(&said) {
+    match Misfit::from_message(&said) {
         Some(misfit) => misfit.to_string(),
         None if is_no_word(&said) => "a word belongs here; correct this entry".into(),
         None if said.ends_with(" number overflowed") => {
@@ -84,7 +84,7 @@ pub(crate) fn is_no_word(said: &str) -> bool {
 
 impl Misfit {
     /// What a reader says, if it is about a value's type, size or length.
-    pub fn of(said: &str) -> Option<Self> {
+    pub fn from_message(said: &str) -> Option<Self> {
         let said = without_place(said);
         if is_no_word(said) {
             return None;
@@ -179,13 +179,13 @@ fn wanted(expected: &str) -> (String, String) {
         _ if list.iter().any(|of| expected.starts_with(of)) => {
             let is_digit = |c: char| c.is_ascii_digit();
             let mut words = expected.split(' ');
-            let of = words.find(|word| word.chars().all(is_digit));
+            let list_length = words.find(|word| word.chars().all(is_digit));
             let numbers = if expected.contains("f64") {
                 " numbers"
             } else {
                 ""
             };
-            let length = of.map_or(String::new(), |of| format!(" of {of}{numbers}"));
+            let length = list_length.map_or(String::new(), |of| format!(" of {of}{numbers}"));
             (format!("a list{length}"), String::new())
         }
         _ => match (

@@ -23,7 +23,7 @@ pub trait Element: Copy {
     fn put(self, bytes: &mut Vec<u8>);
 
     /// The number, if this type has it.
-    fn of(number: Number) -> Option<Self>;
+    fn from_number(number: Number) -> Option<Self>;
 }
 
 /// An element that was read.
@@ -44,7 +44,7 @@ macro_rules! elements {
                 bytes.extend(self.to_le_bytes());
             }
 
-            fn of(number: Number) -> Option<Self> {
+            fn from_number(number: Number) -> Option<Self> {
                 match number {
                     Number::$variant(value) => Some(value as $kind),
                     _ => None,
@@ -295,7 +295,10 @@ mod tests {
         let head = NpyHead::read(&mut reader).unwrap();
         assert!(head.is_of::<T>() && head.shape == [values.len()]);
         let numbers = head.numbers(&mut reader).unwrap().unwrap();
-        let read: Vec<T> = numbers.into_iter().map(|n| T::of(n).unwrap()).collect();
+        let read: Vec<T> = numbers
+            .into_iter()
+            .map(|n| T::from_number(n).unwrap())
+            .collect();
         assert_eq!(read, values);
     }
 

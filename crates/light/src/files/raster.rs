@@ -119,7 +119,7 @@ impl Raster {
 
     /// The value at a pixel, row 0 at the top.
     #[inline]
-    pub fn at(&self, row: usize, col: usize) -> f32 {
+    pub fn value(&self, row: usize, col: usize) -> f32 {
         self.values[row * self.width + col]
     }
 }

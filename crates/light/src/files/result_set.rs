@@ -86,7 +86,7 @@ pub fn file_hash(path: &Path) -> io::Result<(u64, String)> {
 }
 
 impl ManifestFile {
-    fn of(folder: &Path, name: &str) -> io::Result<Self> {
+    fn from_file(folder: &Path, name: &str) -> io::Result<Self> {
         let (bytes, sha256) = file_hash(&folder.join(name))?;
         Ok(ManifestFile {
             name: name.to_owned(),
@@ -242,9 +242,9 @@ impl ResultSet {
         };
         let others = others
             .iter()
-            .map(|name| ManifestFile::of(&self.folder, name));
+            .map(|name| ManifestFile::from_file(&self.folder, name));
         let others = others.collect::<io::Result<_>>().map_err(failed)?;
-        self.put(&switch, [files, others], previous_files, configuration)
+        self.publish(&switch, [files, others], previous_files, configuration)
             .map_err(failed)?;
         Ok(switch.sentences(&self.folder))
     }
@@ -258,11 +258,11 @@ impl ResultSet {
             names.push(name.map_err(|name| io::Error::other(format!("{name:?} is not text")))?);
         }
         names.sort();
-        let describe = |name: &String| ManifestFile::of(staging, name);
+        let describe = |name: &String| ManifestFile::from_file(staging, name);
         names.iter().map(describe).collect()
     }
 
-    fn put(
+    fn publish(
         &self,
         switch: &Switch,
         [files, others]: [Vec<ManifestFile>; 2],
@@ -287,18 +287,18 @@ impl ResultSet {
         manifest.write(&after)?;
 
         let _undisturbed = Registry::lock();
-        let at = |name: &str| self.folder.join(name);
+        let path = |name: &str| self.folder.join(name);
         for (name, other) in &switch.set_aside {
-            fs::rename(at(name), at(other))?;
+            fs::rename(path(name), path(other))?;
         }
-        fs::rename(&during, at(MANIFEST))?;
+        fs::rename(&during, path(MANIFEST))?;
         for ManifestFile { name, .. } in &files {
-            fs::rename(staging.join(name), at(name))?;
+            fs::rename(staging.join(name), path(name))?;
         }
         for name in &switch.remove {
-            fs::remove_file(at(name))?;
+            fs::remove_file(path(name))?;
         }
-        fs::rename(&after, at(MANIFEST))
+        fs::rename(&after, path(MANIFEST))
     }
 }
 
@@ -316,7 +316,7 @@ impl Switch {
             // Hashing is for those that might be.
             Ok(about.is_file()
                 && known.iter().any(|f| f.bytes == about.len())
-                && known.contains(&&ManifestFile::of(folder, name)?))
+                && known.contains(&&ManifestFile::from_file(folder, name)?))
         };
         let exists = |name: &str| fs::symlink_metadata(folder.join(name)).is_ok();
         let mut switch = Switch::default();
@@ -330,7 +330,7 @@ impl Switch {
             let is_same = || -> io::Result<bool> {
                 Ok(about.is_file()
                     && about.len() == file.bytes
-                    && ManifestFile::of(folder, name)? == *file)
+                    && ManifestFile::from_file(folder, name)? == *file)
             };
             if !is_ours(name)? && !is_same()? {
                 let other = free_name(name, exists);
@@ -356,13 +356,13 @@ impl Switch {
     }
 
     fn sentences(&self, folder: &Path) -> Vec<String> {
-        let at = |name: &String| folder.join(name).display().to_string();
+        let shown_path = |name: &String| folder.join(name).display().to_string();
         let set_aside = (self.set_aside.iter())
             .map(|(name, other)| set_aside_sentence(&folder.join(name), &folder.join(other)));
         let kept = self.kept.iter().map(|name| {
             format!(
                 "{} has been changed since an earlier run wrote it, and was kept; it is none of these results",
-                at(name)
+                shown_path(name)
             )
         });
         set_aside.chain(kept).collect()

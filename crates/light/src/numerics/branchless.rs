@@ -170,7 +170,7 @@ mod tests {
     use crate::numerics::special;
     use proptest::prelude::*;
 
-    fn near(found: f64, expected: f64, error: f64) -> Result<(), TestCaseError> {
+    fn check_near(found: f64, expected: f64, error: f64) -> Result<(), TestCaseError> {
         let off = (found - expected).abs();
         prop_assert!(off <= error * expected.abs(), "{found} {expected}");
         Ok(())
@@ -179,15 +179,15 @@ mod tests {
     proptest! {
         #[test]
         fn exponentials_are_those_of_libm(x in -708.0f64..709.0, small in -1.0f64..1.0) {
-            near(exp(x), libm::exp(x), 1e-15)?;
-            near(exp(small), libm::exp(small), 1e-15)?;
+            check_near(exp(x), libm::exp(x), 1e-15)?;
+            check_near(exp(small), libm::exp(small), 1e-15)?;
         }
 
         #[test]
         fn logarithms_are_those_of_libm(ln_x in -700.0f64..700.0, about_one in 0.5f64..2.0) {
             let x = libm::exp(ln_x);
-            near(ln(x), libm::log(x), 1e-15)?;
-            near(ln(about_one), libm::log(about_one), 1e-15)?;
+            check_near(ln(x), libm::log(x), 1e-15)?;
+            check_near(ln(about_one), libm::log(about_one), 1e-15)?;
         }
 
         #[test]
@@ -203,8 +203,8 @@ mod tests {
 
         #[test]
         fn tails_are_those_of_the_error_function(z in 0.0f64..37.5, small in 0.0f64..3.0) {
-            near(normal_above(z), special::normal_above(z), 2e-13)?;
-            near(normal_above(small), special::normal_above(small), 2e-15)?;
+            check_near(normal_above(z), special::normal_above(z), 2e-13)?;
+            check_near(normal_above(small), special::normal_above(small), 2e-15)?;
         }
     }
 

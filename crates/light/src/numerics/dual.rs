@@ -31,9 +31,9 @@ impl<const K: usize> Dual<K> {
     }
 
     /// Parameter number `of` itself.
-    pub fn parameter(value: f64, of: usize) -> Self {
+    pub fn parameter(value: f64, index: usize) -> Self {
         let mut dual = Self::constant(value);
-        dual.slope[of] = 1.0;
+        dual.slope[index] = 1.0;
         dual
     }
 
@@ -161,12 +161,12 @@ mod tests {
             let f = |x: Dual<2>, y: Dual<2>| {
                 (x * y - y.recip()) * (x * 0.3).exp() + (x - y).exprel_neg() + x.exprel_neg() * 2.0
             };
-            let at = |x: f64, y: f64| f(Dual::constant(x), Dual::constant(y)).value;
+            let value = |x: f64, y: f64| f(Dual::constant(x), Dual::constant(y)).value;
             let dual = f(Dual::parameter(x, 0), Dual::parameter(y, 1));
             let h = 1e-5;
-            let by_x = (at(x + h, y) - at(x - h, y)) / (2.0 * h);
-            let by_y = (at(x, y + h) - at(x, y - h)) / (2.0 * h);
-            prop_assert_eq!(dual.value, at(x, y));
+            let by_x = (value(x + h, y) - value(x - h, y)) / (2.0 * h);
+            let by_y = (value(x, y + h) - value(x, y - h)) / (2.0 * h);
+            prop_assert_eq!(dual.value, value(x, y));
             prop_assert!((dual.slope[0] - by_x).abs() < 1e-6 * (1.0 + by_x.abs()), "{} {by_x}", dual.slope[0]);
             prop_assert!((dual.slope[1] - by_y).abs() < 1e-6 * (1.0 + by_y.abs()), "{} {by_y}", dual.slope[1]);
         }

@@ -105,7 +105,7 @@ pub fn deviation(values: &[f64]) -> Estimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
 
     #[test]
     fn shares_by_hand() {
@@ -128,7 +128,7 @@ mod tests {
         let (runs, n) = (10_000, 60);
         let mut covered = [0.0; 2];
         for run in 0..runs {
-            let mut random = random_stream(3, Purpose::Stereo, run, 0);
+            let mut random = random_stream(3, RandomPurpose::Stereo, run, 0);
             let values: Vec<f64> = (0..n).map(|_| 2.0 + 3.0 * normal(&mut random)).collect();
             covered[0] += f64::from(deviation(&values).contains(3.0));
             covered[1] += f64::from(mean(&values).contains(2.0));

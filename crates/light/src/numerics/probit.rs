@@ -10,7 +10,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Trials at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub struct ProbitPoint {
     /// The place.
     pub x: f64,
     /// Trials made.
@@ -20,7 +20,7 @@ pub struct Point {
 }
 
 /// Where the share of successes crosses `level`; `None` when the points do not say.
-pub fn crossing(points: &[Point], level: f64) -> Option<Estimate> {
+pub fn crossing(points: &[ProbitPoint], level: f64) -> Option<Estimate> {
     let standard = Normal::standard();
     // Places in units of their own scale about their middle keep the normal equations well conditioned.
     let middle = points.iter().map(|p| p.x).sum::<f64>() / points.len() as f64;
@@ -29,11 +29,11 @@ pub fn crossing(points: &[Point], level: f64) -> Option<Estimate> {
         .map(|p| (p.x - middle).abs())
         .fold(0.0, f64::max);
     let start = {
-        let share = |p: &Point| (p.successes + 0.5) / (p.trials + 1.0);
+        let share = |p: &ProbitPoint| (p.successes + 0.5) / (p.trials + 1.0);
         let (first, last) = (points.first()?, points.last()?);
-        let of = |p: &Point| standard.inverse_cdf(share(p));
-        let slope = (of(last) - of(first)) * scale / (last.x - first.x);
-        (of(first) - slope * (first.x - middle) / scale, slope)
+        let probit = |p: &ProbitPoint| standard.inverse_cdf(share(p));
+        let slope = (probit(last) - probit(first)) * scale / (last.x - first.x);
+        (probit(first) - slope * (first.x - middle) / scale, slope)
     };
     let (mut a, mut b) = start;
     let mut inverse = [0.0; 3];
@@ -71,12 +71,12 @@ pub fn crossing(points: &[Point], level: f64) -> Option<Estimate> {
     }
     let u = (standard.inverse_cdf(level) - a) / b;
     let variance = (inverse[0] + 2.0 * u * inverse[1] + u * u * inverse[2]) / (b * b);
-    let at = |u: f64| middle + scale * u;
+    let place = |u: f64| middle + scale * u;
     let half = Z_95 * variance.sqrt();
     Some(Estimate {
-        value: at(u),
-        low: at(u - half),
-        high: at(u + half),
+        value: place(u),
+        low: place(u - half),
+        high: place(u + half),
     })
 }
 
@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn exact_shares_give_the_exact_crossing() {
         // Φ(−3 + 0.5·x) is 0.975 at x = (1.95996 + 3)/0.5.
-        let shares = [4.0, 6.0, 7.0, 8.0, 9.0].map(|x: f64| Point {
+        let shares = [4.0, 6.0, 7.0, 8.0, 9.0].map(|x: f64| ProbitPoint {
             x,
             trials: 1e4,
             successes: 1e4 * ln_normal_below(-3.0 + 0.5 * x).exp(),
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn falling_shares_cross_nothing() {
-        let shares = [(1.0, 90.0), (2.0, 50.0), (3.0, 10.0)].map(|(x, successes)| Point {
+        let shares = [(1.0, 90.0), (2.0, 50.0), (3.0, 10.0)].map(|(x, successes)| ProbitPoint {
             x,
             trials: 100.0,
             successes,

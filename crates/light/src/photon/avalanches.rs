@@ -89,7 +89,7 @@ impl<'a> Avalanches<'a> {
         }
         avalanches.unknown = u64::MAX;
         for photon in breeding {
-            avalanches.breed(photon, false);
+            avalanches.queue_children(photon, false);
         }
         avalanches
             .pending
@@ -106,7 +106,7 @@ impl<'a> Avalanches<'a> {
     /// met a blind SPAD. The state must be known.
     pub(crate) fn run_to_the_end(mut self, photons: &[Photon], edges: &mut Vec<SpadEvent>) -> u64 {
         let forever = Time::from_fs(i64::MAX);
-        let known = self.run(photons, None, forever, forever, edges);
+        let known = self.append_edges(photons, None, forever, forever, edges);
         debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
         self.lost
     }
@@ -120,7 +120,7 @@ impl<'a> Avalanches<'a> {
         edges: &mut Vec<SpadEvent>,
     ) {
         let before = edges.len();
-        let known = rows.run(light, from, Some(&mut self.blind_until), from, edges);
+        let known = rows.append_edges(light, from, Some(&mut self.blind_until), from, edges);
         debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
         self.lost += (rows.photons() - (edges.len() - before)) as u64;
     }
@@ -130,7 +130,7 @@ impl<'a> Avalanches<'a> {
     ///
     /// # Errors
     /// Where an edge from `wanted_from` on, or a photon of `echoes`, depends on a SPAD whose state is not known.
-    pub fn run(
+    pub fn append_edges(
         &mut self,
         photons: &[Photon],
         mut echoes: Option<&mut OrderedEchoes<'_>>,
@@ -208,7 +208,7 @@ impl<'a> Avalanches<'a> {
                 self.blind_until[usize::from(spad)] = until;
             }
             if is_ready && breeds {
-                self.breed(photon, true);
+                self.queue_children(photon, true);
             }
             return Ok(());
         }
@@ -222,13 +222,13 @@ impl<'a> Avalanches<'a> {
         self.blind_until[usize::from(spad)] = before.max(time + self.dead_time_of(spad));
         self.unknown |= 1 << spad;
         if breeds {
-            self.breed(photon, false);
+            self.queue_children(photon, false);
         }
         Ok(())
     }
 
     /// Notes what an avalanche causes.
-    fn breed(&mut self, parent: Photon, is_certain: bool) {
+    fn queue_children(&mut self, parent: Photon, is_certain: bool) {
         let parent = SpadEvent::new(parent.time, parent.spad);
         let dead_time = self.dead_time_of(parent.spad);
         let children = self.model.children(self.key, self.pixel, dead_time, parent);
@@ -320,7 +320,7 @@ mod tests {
             let mut avalanches = Avalanches::known_from(&model, [7, 8], 1, &dead_times, from, breeding);
             let mut edges = Vec::new();
             let forever = Time::from_fs(i64::MAX);
-            if avalanches.run(known, None, forever, wanted_from, &mut edges).is_ok() {
+            if avalanches.append_edges(known, None, forever, wanted_from, &mut edges).is_ok() {
                 all.retain(|edge| edge.time >= wanted_from);
                 edges.retain(|edge| edge.time >= wanted_from);
                 prop_assert_eq!(all, edges);
@@ -352,21 +352,27 @@ mod tests {
     #[test]
     fn a_photon_after_a_dead_time_of_darkness_is_known() {
         let model = SpadModel::with_dead_time(Time::from_fs(100));
-        let at = |time_fs| Photon::new(Time::from_fs(time_fs), 3, false);
+        let photon = |time_fs| Photon::new(Time::from_fs(time_fs), 3, false);
         let run = |photons: &[Photon], wanted_from| {
             let from = Time::from_fs(1_000);
             let mut avalanches =
                 Avalanches::known_from(&model, [0; 2], 0, &[], from, std::iter::empty());
             let (forever, wanted) = (Time::from_fs(i64::MAX), Time::from_fs(wanted_from));
             let mut edges = Vec::new();
-            let known = avalanches.run(photons, None, forever, wanted, &mut edges);
+            let known = avalanches.append_edges(photons, None, forever, wanted, &mut edges);
             known.map(|()| edges.len())
         };
-        assert_eq!(run(&[at(1_100)], 0), Ok(1));
-        assert_eq!(run(&[at(1_099)], 0), Err(Unknown));
+        assert_eq!(run(&[photon(1_100)], 0), Ok(1));
+        assert_eq!(run(&[photon(1_099)], 0), Err(Unknown));
         // The second one is lost or not, the third one comes late enough.
-        assert_eq!(run(&[at(1_050), at(1_120), at(1_221)], 1_200), Ok(1));
-        assert_eq!(run(&[at(1_050), at(1_120), at(1_220)], 1_200), Err(Unknown));
+        assert_eq!(
+            run(&[photon(1_050), photon(1_120), photon(1_221)], 1_200),
+            Ok(1)
+        );
+        assert_eq!(
+            run(&[photon(1_050), photon(1_120), photon(1_220)], 1_200),
+            Err(Unknown)
+        );
     }
 
     /// The rules, one SPAD at a time, straight from their wording.

@@ -111,8 +111,8 @@ mod tests {
             n in 0u32..CYCLES,
         ) {
             let law = EchoLaw { cycle_fs: 1000.0, arrival_fs: arrival, sigma_fs: sigma };
-            let at = |n: u32| from - 1000.0 * f64::from(n);
-            let (a, b) = (law.share(0, CYCLES, at(0), at(0) + length), law.share(n, CYCLES, at(n), at(n) + length));
+            let time = |n: u32| from - 1000.0 * f64::from(n);
+            let (a, b) = (law.share(0, CYCLES, time(0), time(0) + length), law.share(n, CYCLES, time(n), time(n) + length));
             prop_assert!((a - b).abs() < 1e-9, "{a} {b}");
         }
     }

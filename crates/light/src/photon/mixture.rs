@@ -111,12 +111,12 @@ pub fn merged(glints: &mut [Glint], pulse_sigma: Time, resolution: Time) -> Smal
     glints.sort_by(|a, b| a.arrival_fs.total_cmp(&b.arrival_fs));
     let resolution_fs = resolution.as_fs() as f64;
     part_at_gaps(glints, GAP * resolution_fs);
-    let mut groups = SmallVec::<[Group; 1]>::new();
+    let mut groups = SmallVec::<[GlintGroup; 1]>::new();
     part(glints, resolution_fs, &mut groups);
     let mut groups = without_negligible(groups);
     groups.sort_by(|a, b| b.photons.total_cmp(&a.photons));
     let sigma_fs2 = (pulse_sigma.as_fs() as f64).powi(2);
-    let echo = |group: &Group| {
+    let echo = |group: &GlintGroup| {
         let sigma_fs = (sigma_fs2 + group.variance_fs2).sqrt().round() as i64;
         let arrival = Time::from_fs(group.mean_fs.round() as i64);
         Echo::new(group.photons, arrival).with_sigma(Time::from_fs(sigma_fs))
@@ -126,12 +126,12 @@ pub fn merged(glints: &mut [Glint], pulse_sigma: Time, resolution: Time) -> Smal
 
 /// The same light where no echo has less than [`NEGLIGIBLE`] photons: fainter ones are joined in order of time until they have as many, and
 /// what is left goes to the brightest.
-fn without_negligible(mut groups: SmallVec<[Group; 1]>) -> SmallVec<[Group; 1]> {
+fn without_negligible(mut groups: SmallVec<[GlintGroup; 1]>) -> SmallVec<[GlintGroup; 1]> {
     if groups.len() < 2 {
         return groups;
     }
     groups.sort_by(|a, b| a.mean_fs.total_cmp(&b.mean_fs));
-    let (mut kept, mut faint) = (SmallVec::<[Group; 1]>::new(), None::<Group>);
+    let (mut kept, mut faint) = (SmallVec::<[GlintGroup; 1]>::new(), None::<GlintGroup>);
     for group in groups {
         let group = match faint.take() {
             Some(before) if group.photons <= NEGLIGIBLE => before.joined(&group),
@@ -158,12 +158,12 @@ fn without_negligible(mut groups: SmallVec<[Group; 1]>) -> SmallVec<[Group; 1]> 
 
 /// Numbers the surfaces of `glints`, which are in order of time: what is of one object before and after a gap are two.
 fn part_at_gaps(glints: &mut [Glint], gap_fs: f64) {
-    struct Reached {
+    struct ReachedSurface {
         object: usize,
         until_fs: f64,
         surface: usize,
     }
-    let mut reached = SmallVec::<[Reached; 4]>::new();
+    let mut reached = SmallVec::<[ReachedSurface; 4]>::new();
     let mut surfaces = 0;
     for glint in glints {
         let half_fs = glint.half_fs();
@@ -178,7 +178,7 @@ fn part_at_gaps(glints: &mut [Glint], gap_fs: f64) {
                 last
             }
             None => {
-                reached.push(Reached {
+                reached.push(ReachedSurface {
                     object: glint.surface,
                     until_fs,
                     surface: surfaces,
@@ -192,8 +192,8 @@ fn part_at_gaps(glints: &mut [Glint], gap_fs: f64) {
 }
 
 /// Adds the groups of `glints`, which are in order of time, to `groups`.
-fn part(glints: &[Glint], resolution_fs: f64, groups: &mut SmallVec<[Group; 1]>) {
-    let group = Group::of(glints);
+fn part(glints: &[Glint], resolution_fs: f64, groups: &mut SmallVec<[GlintGroup; 1]>) {
+    let group = GlintGroup::new(glints);
     if group.photons == 0.0 {
         return;
     }
@@ -243,8 +243,8 @@ fn depth_fs(glints: &[Glint]) -> f64 {
 }
 
 /// Adds slices of one deep surface, equally deep, of `slice_fs` at most.
-fn slice(glints: &[Glint], slice_fs: f64, groups: &mut SmallVec<[Group; 1]>) {
-    let group = Group::of(glints);
+fn slice(glints: &[Glint], slice_fs: f64, groups: &mut SmallVec<[GlintGroup; 1]>) {
+    let group = GlintGroup::new(glints);
     if group.photons == 0.0 {
         return;
     }
@@ -305,14 +305,14 @@ fn best_cut(glints: &[Glint]) -> Option<usize> {
 }
 
 /// Moments of the arrivals of some glints.
-struct Group {
+struct GlintGroup {
     photons: f64,
     mean_fs: f64,
     variance_fs2: f64,
 }
 
-impl Group {
-    fn of(glints: &[Glint]) -> Self {
+impl GlintGroup {
+    fn new(glints: &[Glint]) -> Self {
         let photons: f64 = glints.iter().map(|glint| glint.photons).sum();
         let origin_fs = glints.first().map_or(0.0, |glint| glint.arrival_fs);
         let late = |glint: &Glint| glint.photons * (glint.arrival_fs - origin_fs);
@@ -321,7 +321,7 @@ impl Group {
             let off_fs = glint.arrival_fs - mean_fs;
             glint.photons * (off_fs * off_fs + glint.variance_fs2)
         };
-        Group {
+        GlintGroup {
             photons,
             mean_fs,
             variance_fs2: glints.iter().map(square).sum::<f64>() / photons,
@@ -333,7 +333,7 @@ impl Group {
         let photons = self.photons + other.photons;
         let share = other.photons / photons;
         let apart_fs = other.mean_fs - self.mean_fs;
-        Group {
+        GlintGroup {
             photons,
             mean_fs: self.mean_fs + share * apart_fs,
             variance_fs2: self.variance_fs2
@@ -345,8 +345,8 @@ impl Group {
     /// Greatest share of their photons on the wrong side of an instant, were they one Gaussian.
     fn distance(&self, glints: &[Glint], pulse_fs2: f64) -> f64 {
         let sigma_fs = (self.variance_fs2 + pulse_fs2).sqrt();
-        let column = |of: fn(&Glint, f64) -> f64| -> SmallVec<[f64; 64]> {
-            glints.iter().map(|glint| of(glint, pulse_fs2)).collect()
+        let column = |value: fn(&Glint, f64) -> f64| -> SmallVec<[f64; 64]> {
+            glints.iter().map(|glint| value(glint, pulse_fs2)).collect()
         };
         let arrivals_fs = column(|glint, _| glint.arrival_fs);
         let own_fs = column(|glint, pulse_fs2| {
@@ -364,7 +364,7 @@ impl Group {
             );
             let before = glints.iter().zip(&shares);
             let exact: f64 = before.map(|(glint, share)| glint.photons * share).sum();
-            (exact / self.photons - below(z)).abs()
+            (exact / self.photons - normal_cdf(z)).abs()
         };
         (0..INSTANTS).fold(0.0, |most, n| off(n).max(most))
     }
@@ -375,13 +375,13 @@ impl Group {
 fn shares_before(time_fs: f64, arrivals_fs: &[f64], sigmas_fs: &[f64], shares: &mut [f64]) {
     let pulses = arrivals_fs.iter().zip(sigmas_fs);
     for (share, (arrival_fs, sigma_fs)) in shares.iter_mut().zip(pulses) {
-        *share = below((time_fs - arrival_fs) / sigma_fs);
+        *share = normal_cdf((time_fs - arrival_fs) / sigma_fs);
     }
 }
 
 /// The standard normal distribution function.
 #[inline(always)]
-fn below(z: f64) -> f64 {
+fn normal_cdf(z: f64) -> f64 {
     let tail = branchless::normal_above(z.abs());
     if z > 0.0 { 1.0 - tail } else { tail }
 }

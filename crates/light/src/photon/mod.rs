@@ -34,7 +34,7 @@ pub use philox::LANES;
 pub use pulse::{PulseError, PulseShape};
 pub use pulses::PixelPhotons;
 pub use quantile::{NormalSampler, RANKS};
-pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
+pub use random::{Poisson, RandomPurpose, normal, philox_key, random_stream};
 pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, MOST_SPREAD, Photon, SpadEvent, SpadModel,
     Unknown, sort_photons,
@@ -43,8 +43,8 @@ pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use spad_layout::SpadLayout;
 pub use spad_rows::SpadRows;
 pub use stream::{
-    Background, Draw, GROUP, Group, LightParts, ListedEchoes, NEVER_FS, OrderedEchoes, PER_BLOCK,
-    PLACE_BITS, PhotonStream, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE, TIME_BITS,
-    signal_rank, spad_of,
+    BackgroundBlock, CycleGroup, Draw, GROUP, GroupPlace, LightParts, ListedEchoes, NEVER_FS,
+    OrderedEchoes, PER_BLOCK, PLACE_BITS, PhotonStream, PixelStream, SlotRun, Slots, Span,
+    StreamConfig, TILE, TIME_BITS, signal_rank, spad_of,
 };
 pub use tail::{DiffusionTail, EchoWidth, TAIL_REACH, late_edge};

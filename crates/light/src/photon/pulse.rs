@@ -217,11 +217,11 @@ impl PulseSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Purpose, random_stream};
+    use crate::photon::{RandomPurpose, random_stream};
 
     /// Largest distance between the draws' distribution and `cumulative`, times √n (Kolmogorov and Smirnov).
     fn kolmogorov(sampler: &PulseSampler, cumulative: impl Fn(f64) -> f64) -> f64 {
-        let mut random = random_stream(5, Purpose::Photons, 0, 0);
+        let mut random = random_stream(5, RandomPurpose::Photons, 0, 0);
         let n = 200_000;
         let mut draws: Vec<f64> = (0..n)
             .map(|_| sampler.draw(std::array::from_fn(|_| random.next_u32())))
@@ -256,7 +256,7 @@ mod tests {
     fn moments_are_those_of_the_draws() {
         let shape = PulseShape::new(Time::from_ps(900), &[0.0, 5.0, 3.0, 0.0, 1.0]).unwrap();
         let sampler = PulseSampler::measured(&shape);
-        let mut random = random_stream(6, Purpose::Photons, 0, 0);
+        let mut random = random_stream(6, RandomPurpose::Photons, 0, 0);
         let n = 200_000;
         let draws = (0..n).map(|_| sampler.draw(std::array::from_fn(|_| random.next_u32())));
         let (sum, squares) = draws.fold((0.0, 0.0), |(a, b), x| (a + x, b + x * x));

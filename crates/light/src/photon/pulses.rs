@@ -88,11 +88,11 @@ impl PhotonStream {
                 by_cycle.sort(&draw, light);
                 for cycle in 0..cycles {
                     let start = self.cycle_start(group.first_cycle() + cycle);
-                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| {
+                    photons.extend(by_cycle.cycle_photons(cycle).iter().map(|&photon| {
                         Photon::new(
                             start + Time::from_fs(photon >> SPAD_SHIFT),
                             (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
-                            light.breeds(),
+                            light.has_secondaries(),
                         )
                     }));
                 }
@@ -110,7 +110,7 @@ impl PhotonStream {
             };
             let now = photons.partition_point(|photon| photon.time < until);
             edges.clear();
-            let known = avalanches.run(&photons[..now], None, until, until, &mut edges);
+            let known = avalanches.append_edges(&photons[..now], None, until, until, &mut edges);
             debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
             photons.drain(..now);
             drawn += now as u64;
@@ -160,7 +160,7 @@ impl PhotonStream {
             while next_echo < config.laser_cycles && may_begin(next_echo) {
                 echoes.add(next_echo);
                 for (light, listed) in parts.iter().zip(&mut listed) {
-                    photons.extend_from_slice(listed.of(light, next_echo));
+                    photons.extend_from_slice(listed.photons(light, next_echo));
                 }
                 next_echo += 1;
             }
@@ -174,12 +174,12 @@ impl PhotonStream {
             later.retain(|photon| photon.time < end);
             drawn += photons.len() as u64;
             edges.clear();
-            if are_apart && rows.put(&parts[0], &photons, from, until) {
+            if are_apart && rows.sort_in(&parts[0], &photons, from, until) {
                 avalanches.run_rows(&rows, &parts[0], from, &mut edges);
             } else {
                 sort_photons(&mut photons, from, &mut keys);
                 let echoes = (!echoes.is_empty()).then_some(&mut echoes);
-                let known = avalanches.run(&photons, echoes, until, until, &mut edges);
+                let known = avalanches.append_edges(&photons, echoes, until, until, &mut edges);
                 debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
             }
             photons.clear();

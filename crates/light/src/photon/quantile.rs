@@ -65,7 +65,7 @@ fn density(z: f64) -> f64 {
 }
 
 /// The lower tail up to `z`.
-fn below(z: f64) -> f64 {
+fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
@@ -74,7 +74,7 @@ fn below(z: f64) -> f64 {
 fn quantile(p: f64, near: f64) -> f64 {
     let mut z = near;
     for _ in 0..8 {
-        let tail = below(z);
+        let tail = normal_cdf(z);
         z -= libm::log(tail / p) * tail / density(z);
     }
     z
@@ -101,7 +101,7 @@ impl NormalSampler {
     #[inline]
     pub(crate) fn quantile(&self, p: f64) -> f64 {
         let tail = p.min(1.0 - p).max(0.5f64.powi(TAIL_BITS as i32 + 2));
-        let z = self.below(tail);
+        let z = self.lower_quantile(tail);
         if p > 0.5 {
             -z * self.sigma
         } else {
@@ -111,7 +111,7 @@ impl NormalSampler {
 
     /// The quantile of a tail of 2⁻⁵⁰ to ½ of the standard normal distribution.
     #[inline]
-    fn below(&self, tail: f64) -> f64 {
+    fn lower_quantile(&self, tail: f64) -> f64 {
         let bits = tail.to_bits();
         let piece = ((bits >> WITHIN_BITS) - FIRST_PIECE) as usize;
         let [c0, c1, c2, c3] = self.cubics[piece % ROOM];
@@ -125,7 +125,7 @@ impl NormalSampler {
     pub fn draw(&self, word: u64) -> f64 {
         let half_steps = (word & ((1 << TAIL_BITS) - 1)) << 1 | 1;
         let tail = half_steps as f64 * 0.5f64.powi(TAIL_BITS as i32 + 2);
-        let z = self.below(tail);
+        let z = self.lower_quantile(tail);
         let sign = word >> TAIL_BITS << 63;
         f64::from_bits((z * self.sigma).to_bits() ^ sign)
     }
@@ -151,7 +151,7 @@ impl NormalSampler {
         } else if first > self.reach() {
             return [i16::MAX; 2];
         }
-        let rank = |z: f64| below(z / self.sigma) * f64::from(RANKS);
+        let rank = |z: f64| normal_cdf(z / self.sigma) * f64::from(RANKS);
         // A rank stands for all probabilities up to the next one.
         [rank(first).floor() as i16 - 1, rank(last).ceil() as i16 + 1]
     }
@@ -207,7 +207,7 @@ mod tests {
             prop_assert_eq!(z.is_sign_positive(), upper);
             prop_assert!(z.abs() <= NormalSampler::new(1.0).reach());
             let expected = (tail_word as f64 + 0.5) * 0.5f64.powi(TAIL_BITS as i32 + 1);
-            let tail = below(-z.abs());
+            let tail = normal_cdf(-z.abs());
             // In standard deviations: the tail's error over the density.
             let error = (tail - expected).abs() / density(z);
             prop_assert!(error < 1e-7, "{error}");

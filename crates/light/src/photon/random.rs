@@ -1,7 +1,7 @@
 //! Random numbers that are a pure function of what they are for.
 //!
 //! Every draw comes from the counter-based generator Philox4x32-10 (Salmon et al., SC 2011). Its
-//! 64-bit key holds the seed, its 128-bit counter says which number is wanted: a [`Purpose`], an
+//! 64-bit key holds the seed, its 128-bit counter says which number is wanted: a [`RandomPurpose`], an
 //! index (a pixel), a sub-index (a laser cycle) and a block of four words within. Nothing depends
 //! on threads or order, and all functions used here round alike on every platform.
 
@@ -10,7 +10,7 @@ use rand_philox::{Philox, splitmix64};
 /// What a random number is used for; different purposes never share numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Purpose {
+pub enum RandomPurpose {
     /// Cycles, times and SPADs of background photons.
     Photons = 0,
     /// Disparity errors of the stereo camera.
@@ -55,7 +55,7 @@ pub enum Purpose {
 ///
 /// It holds 2³² blocks of four words before it would run into the next `sub_index`.
 #[inline]
-pub fn random_stream(seed: u64, purpose: Purpose, index: u32, sub_index: u32) -> Philox {
+pub fn random_stream(seed: u64, purpose: RandomPurpose, index: u32, sub_index: u32) -> Philox {
     let counter =
         u128::from(purpose as u32) << 96 | u128::from(index) << 64 | u128::from(sub_index) << 32;
     Philox::new(philox_key(seed), counter)
@@ -233,7 +233,7 @@ mod tests {
     fn poisson_mean_and_variance_agree_for_small_and_large_means() {
         for mean in [1e-3, 0.3, 11.0, 63.9, 64.1, 900.0] {
             let distribution = Poisson::new(mean);
-            let mut random = random_stream(1, Purpose::Photons, 0, 0);
+            let mut random = random_stream(1, RandomPurpose::Photons, 0, 0);
             let n = 100_000;
             let (m, v) = moments((0..n).map(|_| f64::from(distribution.draw(&mut random))));
             let error = (mean / f64::from(n)).sqrt();
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn nothing_comes_of_mean_zero_and_tiny_means_are_kept() {
-        let mut random = random_stream(7, Purpose::Photons, 0, 0);
+        let mut random = random_stream(7, RandomPurpose::Photons, 0, 0);
         let zero = Poisson::new(0.0);
         assert!((0..1000).all(|_| zero.draw(&mut random) == 0));
         let tiny = exceedance_table(1e-12);
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn normal_draws_have_mean_zero_and_variance_one() {
-        let mut random = random_stream(3, Purpose::Stereo, 5, 0);
+        let mut random = random_stream(3, RandomPurpose::Stereo, 5, 0);
         let (m, v) = moments((0..200_000).map(|_| normal(&mut random)));
         assert!(m.abs() < 0.01 && (v - 1.0).abs() < 0.02, "{m} {v}");
     }
@@ -277,11 +277,11 @@ mod tests {
     fn purposes_indices_and_seeds_do_not_share_words() {
         let first = |seed, purpose, i, s| random_stream(seed, purpose, i, s).next_u64();
         let words = [
-            first(0, Purpose::Photons, 0, 0),
-            first(0, Purpose::Photons, 0, 1),
-            first(0, Purpose::Photons, 1, 0),
-            first(0, Purpose::Stereo, 0, 0),
-            first(1, Purpose::Photons, 0, 0),
+            first(0, RandomPurpose::Photons, 0, 0),
+            first(0, RandomPurpose::Photons, 0, 1),
+            first(0, RandomPurpose::Photons, 1, 0),
+            first(0, RandomPurpose::Stereo, 0, 0),
+            first(1, RandomPurpose::Photons, 0, 0),
         ];
         for (i, a) in words.iter().enumerate() {
             assert!(words[i + 1..].iter().all(|b| a != b));

@@ -19,7 +19,7 @@
 
 use smallvec::SmallVec;
 
-use super::random::{Purpose, normal, random_stream};
+use super::random::{RandomPurpose, normal, random_stream};
 use crate::photon::SpadGrid;
 use crate::units::Time;
 
@@ -155,7 +155,7 @@ impl SpadModel {
         }
         let place = DEAD_TIMES | u32::from(spad);
         let seed = self.dead_time_seed.into();
-        let mut random = random_stream(seed, Purpose::SpadSpread, pixel, place);
+        let mut random = random_stream(seed, RandomPurpose::SpadSpread, pixel, place);
         self.dead_time_at(normal(&mut random).clamp(-SPREAD_REACH, SPREAD_REACH))
     }
 
@@ -226,7 +226,7 @@ impl SpadModel {
         parent: SpadEvent,
     ) -> impl Iterator<Item = SpadEvent> {
         let time_fs = parent.time.as_fs() as u64;
-        let purpose = Purpose::Avalanches as u32 | u32::from(parent.spad) << 8;
+        let purpose = RandomPurpose::Avalanches as u32 | u32::from(parent.spad) << 8;
         let counter = [time_fs as u32, (time_fs >> 32) as u32, pixel, purpose];
         let words = rand_philox::philox4x32_10(counter, key);
         // One word tells which of the two it causes, given that it causes something.

@@ -91,7 +91,7 @@ impl SpadLayout {
     ///
     /// # Errors
     /// When `spread` has another number of SPADs.
-    pub fn lit(
+    pub fn place_light(
         self,
         light: PixelLight,
         spread: Option<&SpadSpread>,
@@ -184,7 +184,7 @@ mod tests {
                 },
             };
             let light = PixelLight::echo(2.0, Time::from_ns(300)).with_background(1e6);
-            let light = layout.lit(light, None).unwrap();
+            let light = layout.place_light(light, None).unwrap();
             let events = PhotonStream::new(&config).pixel_events(7, &light).events;
             let mut of_spad = vec![0.0; spads];
             for event in events {
@@ -206,7 +206,7 @@ mod tests {
         let layout = SpadLayout::new(3).unwrap();
         let spread = SpadSpread::new(&[0.5, 1.0, 1.5], &[10.0, 0.0, 30.0]).unwrap();
         let light = PixelLight::background(100.0);
-        let lit = layout.lit(light.clone(), Some(&spread)).unwrap();
+        let lit = layout.place_light(light.clone(), Some(&spread)).unwrap();
         let own = lit.spads().unwrap();
         let factors: Vec<f64> = own.factors().iter().map(|f| f * 3.0 / 4.0).collect();
         let expected = [0.5, 1.0, 1.5, 0.0];
@@ -224,6 +224,6 @@ mod tests {
                 .all(|(a, b)| (a - b).abs() < 1e-12)
         );
         let other = SpadSpread::new(&[1.0], &[0.0]).unwrap();
-        assert!(layout.lit(light, Some(&other)).is_err());
+        assert!(layout.place_light(light, Some(&other)).is_err());
     }
 }

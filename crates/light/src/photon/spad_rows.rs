@@ -8,7 +8,7 @@
 //!
 //! Photons are counted by SPAD and row, and put where their row begins. A row that a SPAD is blind for is not looked at. Where photons prolong blindness, or
 //! the SPAD's state is not known yet, only the first and the last photon of a row matter. The results are those of
-//! [`Avalanches::run`](super::Avalanches::run).
+//! [`Avalanches::append_edges`](super::Avalanches::append_edges).
 
 use super::spad::{DeadTimeLaw, Photon, SpadEvent, Unknown};
 use super::stream::PixelStream;
@@ -28,7 +28,7 @@ pub struct SpadRows {
 impl SpadRows {
     /// Sorts `photons` in, none of which comes before `from` or from `until` on. False, and nothing done, where there are far fewer photons than rows of
     /// all SPADs: then a sort takes less time.
-    pub fn put(
+    pub fn sort_in(
         &mut self,
         light: &PixelStream<'_>,
         photons: &[Photon],
@@ -85,7 +85,7 @@ impl SpadRows {
     ///
     /// # Errors
     /// Where an edge from `wanted_from` on depends on what came before `from`.
-    pub fn run(
+    pub fn append_edges(
         &self,
         light: &PixelStream<'_>,
         from: Time,
@@ -219,20 +219,20 @@ mod tests {
             let mut photons: Vec<Photon> = photons.filter(|photon| !knows_all || photon.time >= from).collect();
             let known: Vec<Photon> = photons.iter().copied().filter(|photon| photon.time >= from).collect();
             let mut rows = SpadRows::default();
-            prop_assume!(rows.put(&parts[0], &known, from, until));
+            prop_assume!(rows.sort_in(&parts[0], &known, from, until));
             let mut found = Vec::new();
             let mut blind_until = [Time::from_fs(from_fs - 1); 4];
             let before = knows_all.then_some(&mut blind_until[..]);
-            let is_known = rows.run(&parts[0], from, before, wanted_from, &mut found);
+            let is_known = rows.append_edges(&parts[0], from, before, wanted_from, &mut found);
             photons.sort_unstable();
             let known = &photons[photons.len() - known.len()..];
             let mut without_past = parts[0].avalanches((!knows_all).then_some(from), std::iter::empty());
-            let without_past = without_past.run(known, None, until, wanted_from, &mut Vec::new());
+            let without_past = without_past.append_edges(known, None, until, wanted_from, &mut Vec::new());
             prop_assert_eq!(is_known, without_past);
             if is_known.is_ok() {
                 let mut expected = Vec::new();
                 let mut with_past = parts[0].avalanches(None, std::iter::empty());
-                prop_assert!(with_past.run(&photons, None, until, from, &mut expected).is_ok());
+                prop_assert!(with_past.append_edges(&photons, None, until, from, &mut expected).is_ok());
                 for edges in [&mut found, &mut expected] {
                     edges.retain(|edge| edge.time >= wanted_from);
                 }

@@ -58,11 +58,11 @@ mod part;
 mod schedule;
 mod slot;
 
-pub use bright::{Background, TILE, spad_of};
+pub use bright::{BackgroundBlock, TILE, spad_of};
 pub(super) use dim::{ByCycle, SPAD_SHIFT};
-pub use draw::{Draw, PER_BLOCK, Run};
+pub use draw::{Draw, PER_BLOCK, SlotRun};
 pub use exposure::{PhotonStream, Span, StreamConfig};
-pub use group::{GROUP, Group, PLACE_BITS, Place};
+pub use group::{CycleGroup, GROUP, GroupPlace, PLACE_BITS};
 pub use listed::ListedEchoes;
 pub use ordered::{NEVER_FS, OrderedEchoes};
 pub use part::{LightParts, PixelStream, signal_rank};

@@ -78,8 +78,8 @@ impl DiffusionTail {
                 let least_fs = (tail_fs + own_fs * last) / MOST_SAMPLES;
                 let step_fs = own_fs.min((tau_fs / SAMPLES).max(least_fs)).ceil();
                 let samples = (own_fs * last / step_fs).ceil() as usize + 1;
-                let at = |n: usize| shape.power_at(n as f64 * step_fs / own_fs);
-                ((0..samples).map(at).collect(), step_fs)
+                let sample_power = |n: usize| shape.power_at(n as f64 * step_fs / own_fs);
+                ((0..samples).map(sample_power).collect(), step_fs)
             }
         };
         // Exact for powers that are linear between samples.
@@ -125,12 +125,12 @@ mod tests {
     /// Share of the photons before a time, by adding up over delays.
     fn by_sum(time: f64, sigma: f64, tau: f64) -> f64 {
         let steps = 20_000;
-        let of = |n: i32| {
+        let share = |n: i32| {
             let u = (f64::from(n) + 0.5) / f64::from(steps);
             let delay = -tau * u.ln();
             pulse_share(f64::NEG_INFINITY.max(-1e6), time - delay, sigma)
         };
-        (0..steps).map(of).sum::<f64>() / f64::from(steps)
+        (0..steps).map(share).sum::<f64>() / f64::from(steps)
     }
 
     proptest! {

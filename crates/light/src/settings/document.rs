@@ -61,9 +61,9 @@ impl Document {
     /// When it is no TOML, or has a list that is too long, with the line; when the text is too long.
     pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
         let table: Table = crate::files::parse_toml(&source, text)?;
-        let mut document = Self::of(source, table);
+        let mut document = Self::from_table(source, table);
         if let Ok(spans) = DeTable::parse(text) {
-            let (ends, mut long) = (LineEnds::of(text), Vec::new());
+            let (ends, mut long) = (LineEnds::new(text), Vec::new());
             note_lines(spans.get_ref(), "", &ends, &mut document.origins, &mut long);
             document.complain(long)?;
         }
@@ -89,7 +89,7 @@ impl Document {
     }
 
     /// Settings that stand in no file.
-    pub fn of(source: impl std::fmt::Display, table: Table) -> Self {
+    pub fn from_table(source: impl std::fmt::Display, table: Table) -> Self {
         Document {
             source: source.to_string(),
             folder: PathBuf::new(),
@@ -236,7 +236,7 @@ impl Document {
             .collect();
         placed.sort_by(|a, b| a.0.cmp(&b.0));
         InputError::all(placed.into_iter().map(|(origin, message)| match origin {
-            Some(Origin::Line(line)) => InputError::at(&self.source, line, message),
+            Some(Origin::Line(line)) => InputError::at_line(&self.source, line, message),
             Some(Origin::Option(option)) => about_option(&option, message),
             None => InputError::new(&self.source, message),
         }))
@@ -285,7 +285,7 @@ fn about_option(option: &str, message: String) -> InputError {
         let numbered = rest[1..].split_once(": ");
         let line = numbered.and_then(|(line, rest)| Some((line.parse().ok()?, rest)));
         Some(match line {
-            Some((line, rest)) => InputError::at(file, line, rest),
+            Some((line, rest)) => InputError::at_line(file, line, rest),
             None => InputError::new(file, rest.strip_prefix(": ")?),
         })
     };

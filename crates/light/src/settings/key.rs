@@ -138,7 +138,7 @@ impl Key {
     /// What a reader says of a value of the wrong type, in the user's words and with what may be written instead.
     pub(crate) fn misfit(&self, said: &str) -> String {
         let range = &self.range;
-        let Some(misfit) = Misfit::of(said.trim()) else {
+        let Some(misfit) = Misfit::from_message(said.trim()) else {
             return match range {
                 Range::OneOf(words) if is_no_word(said.trim()) => {
                     format!(

@@ -20,11 +20,11 @@ pub fn schema(title: &str, sections: &[Section], values: &Table) -> Value {
         let nothing = Table::new();
         let value = values.get(section.name);
         let is_list = value.is_none_or(toml::Value::is_array);
-        let of = value.and_then(toml::Value::as_table).unwrap_or(&nothing);
+        let section_values = value.and_then(toml::Value::as_table).unwrap_or(&nothing);
         let table = json!({
             "type": "object",
             "description": section.what,
-            "properties": keys(section.keys, of),
+            "properties": keys(section.keys, section_values),
             "additionalProperties": false,
         });
         let table = if is_list {
@@ -44,8 +44,8 @@ pub fn schema(title: &str, sections: &[Section], values: &Table) -> Value {
 }
 
 fn keys(keys: &[Key], values: &Table) -> Map<String, Value> {
-    let of = |key: &Key| (key.name.to_owned(), of_key(key, values.get(key.name)));
-    keys.iter().map(of).collect()
+    let entry = |key: &Key| (key.name.to_owned(), of_key(key, values.get(key.name)));
+    keys.iter().map(entry).collect()
 }
 
 fn of_key(key: &Key, value: Option<&toml::Value>) -> Value {

@@ -103,7 +103,7 @@ impl Counts {
     }
 
     /// P(N > k), summed upwards from k: quick where k is not far below the mean.
-    pub(crate) fn above(&self, k: u64) -> f64 {
+    pub(crate) fn tail_above(&self, k: u64) -> f64 {
         sum_outwards(self.probability(k), k.., |k| self.ratio(k))
     }
 
@@ -208,7 +208,7 @@ impl Tails {
         }
         let end = points - 1;
         let mut above = vec![0.0; points];
-        above[end] = counts.above(grid(end));
+        above[end] = counts.tail_above(grid(end));
         for i in (0..end).rev() {
             above[i] = above[i + 1] + at[i + 1] + between[i];
         }

@@ -1,6 +1,6 @@
 //! How many laser cycles a probability of detection asks for (thesis 3.2.2, end).
 
-use super::detection::{Model, PerCycle, Ties, probability};
+use super::detection::{DetectionModel, PerCycle, Ties, probability};
 
 /// Mean counts in a bin beyond which nobody integrates.
 const MOST_COUNTS: f64 = 1e10;
@@ -12,13 +12,13 @@ const MOST_COUNTS: f64 = 1e10;
 /// cannot suffer from more data. There the search doubles and bisects. The other models start from its
 /// answer: ties lost for certain need more cycles; ties won for certain, and the Gaussians, promise too much
 /// where counts are few, so the search walks down, in steps of a sixteenth, to the last failure.
-pub fn laser_cycles_for(target: f64, light: &PerCycle, model: Model) -> Option<u64> {
+pub fn laser_cycles_for(target: f64, light: &PerCycle, model: DetectionModel) -> Option<u64> {
     if target >= 1.0 || target.is_nan() {
         return None;
     }
     let fair = match model {
-        Model::Bernoulli(_) => Model::Bernoulli(Ties::Random),
-        _ => Model::Poisson(Ties::Random),
+        DetectionModel::Bernoulli(_) => DetectionModel::Bernoulli(Ties::Random),
+        _ => DetectionModel::Poisson(Ties::Random),
     };
     let photons = light.signal + light.background;
     let fair_cycles = search(photons, |n| reaches(target, light, fair, n))?;
@@ -36,7 +36,7 @@ pub fn laser_cycles_for(target: f64, light: &PerCycle, model: Model) -> Option<u
     Some(1)
 }
 
-fn reaches(target: f64, light: &PerCycle, model: Model, cycles: u64) -> bool {
+fn reaches(target: f64, light: &PerCycle, model: DetectionModel, cycles: u64) -> bool {
     probability(light, cycles, model).probability >= target
 }
 

@@ -34,7 +34,7 @@ pub enum Ties {
 
 /// How P_D is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Model {
+pub enum DetectionModel {
     /// Eq. 17 with Poisson counts: every photon counts.
     Poisson(Ties),
     /// Eq. 17 with binomial counts: a bin takes one hit per laser cycle, as this chip's does.
@@ -86,7 +86,7 @@ impl Detection {
 ///
 /// The Gaussian models are sums over all counts x ≥ 0 as Eq. 17 has it; where their standard deviation is
 /// below about one count they are not probabilities and may exceed 1.
-pub fn probability(light: &PerCycle, cycles: u64, model: Model) -> Detection {
+pub fn probability(light: &PerCycle, cycles: u64, model: DetectionModel) -> Detection {
     let n = cycles as f64;
     let (signal, background) = (n * light.signal, n * light.background);
     let known = |probability: f64| Detection {
@@ -94,8 +94,8 @@ pub fn probability(light: &PerCycle, cycles: u64, model: Model) -> Detection {
         miss: 1.0 - probability,
     };
     match model {
-        Model::Poisson(ties) => poisson(signal, background, light.bins, ties),
-        Model::Bernoulli(ties) => {
+        DetectionModel::Poisson(ties) => poisson(signal, background, light.bins, ties),
+        DetectionModel::Bernoulli(ties) => {
             let counts = |photons_per_cycle| Counts::Bernoulli {
                 cycles,
                 photons_per_cycle,
@@ -103,8 +103,10 @@ pub fn probability(light: &PerCycle, cycles: u64, model: Model) -> Detection {
             let signal_bin = counts(light.signal + light.background);
             compare(&signal_bin, &counts(light.background), light.bins, ties)
         }
-        Model::Gaussian => known(gaussian::as_meant(signal, background, light.bins)),
-        Model::GaussianAsPrinted => known(gaussian::as_printed(signal, background, light.bins)),
+        DetectionModel::Gaussian => known(gaussian::as_meant(signal, background, light.bins)),
+        DetectionModel::GaussianAsPrinted => {
+            known(gaussian::as_printed(signal, background, light.bins))
+        }
     }
 }
 
@@ -144,7 +146,7 @@ pub(crate) fn compare(signal: &Counts, background: &Counts, bins: u32, ties: Tie
     (hit, miss) = (hit * stride as f64, miss * stride as f64);
     if hit < miss {
         // No background bin reaches beyond the grid; the signal bin may.
-        hit += signal.above(first + (tails.at.len() as u64 - 1) * stride);
+        hit += signal.tail_above(first + (tails.at.len() as u64 - 1) * stride);
     }
     Detection::new(hit, miss)
 }

@@ -9,7 +9,7 @@ pub const NO_BACKGROUND: f64 = 1e-200;
 
 /// What a histogram with a pulse in it is made of.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Expected {
+pub struct ExpectedHistogram {
     /// Shape of the pulse.
     pub pulse: Pulse,
     /// Width of a bin, ns (a).
@@ -20,7 +20,7 @@ pub struct Expected {
     pub signal: f64,
 }
 
-impl Expected {
+impl ExpectedHistogram {
     /// Mean counts of each of `bins` bins when the pulse lies `position_ns` after the first bin's beginning.
     #[cfg(test)]
     pub(crate) fn counts(&self, bins: usize, position_ns: f64) -> Vec<f64> {
@@ -94,7 +94,7 @@ impl InEdges<'_> {
         terms.sum()
     }
 
-    /// The position of greatest likelihood between the first edge and the last, ns; found as by [`Expected::maximum_likelihood`].
+    /// The position of greatest likelihood between the first edge and the last, ns; found as by [`ExpectedHistogram::maximum_likelihood`].
     pub fn maximum_likelihood(&self, counts: &[u32]) -> f64 {
         let lengths = self.edges_ns.windows(2).map(|ends| ends[1] - ends[0]);
         let step = 0.5 * lengths.fold(self.pulse.sigma_ns(), f64::min);
@@ -136,16 +136,16 @@ fn maximum_within(f: impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Poisson, Purpose, random_stream};
+    use crate::photon::{Poisson, RandomPurpose, random_stream};
     use crate::theory::precision::cramer_rao;
 
     const BINS: usize = 24;
 
     /// RMS error of the maximum likelihood over random positions in mid-histogram.
-    fn spread(expected: &Expected, runs: u32) -> f64 {
+    fn spread(expected: &ExpectedHistogram, runs: u32) -> f64 {
         let mut squares = 0.0;
         for run in 0..runs {
-            let mut random = random_stream(21, Purpose::Photons, run, 0);
+            let mut random = random_stream(21, RandomPurpose::Photons, run, 0);
             let phase = f64::from(run) / f64::from(runs);
             let position = (BINS as f64 / 2.0 + phase) * expected.bin_ns;
             let counts: Vec<u32> = (expected.counts(BINS, position).iter())
@@ -156,8 +156,8 @@ mod tests {
         (squares / f64::from(runs)).sqrt()
     }
 
-    fn expected(sigma_ns: f64, background: f64, signal: f64) -> Expected {
-        Expected {
+    fn expected(sigma_ns: f64, background: f64, signal: f64) -> ExpectedHistogram {
+        ExpectedHistogram {
             pulse: Pulse::Gaussian { sigma_ns },
             bin_ns: 1.0,
             background,

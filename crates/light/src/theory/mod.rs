@@ -16,4 +16,4 @@ pub mod significance;
 pub mod spread_echo;
 
 pub use counts::{Counts, Tails};
-pub use pulse::{LnBin, MeasuredPulse, Pulse, PulseError};
+pub use pulse::{LnBin, MeasuredPulse, Pulse, PulseSamplesError};

@@ -38,7 +38,7 @@ pub struct Link {
 
 /// What must be reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Goal {
+pub struct RangingGoal {
     /// Standard deviation of the range, m.
     pub precision_m: f64,
     /// Probability of detection, 0 to 1.
@@ -55,7 +55,7 @@ pub struct Models {
     /// For the laser cycles of a measurement.
     pub precision: Precision,
     /// For those of a detection.
-    pub detection: detection::Model,
+    pub detection: detection::DetectionModel,
 }
 
 /// A system whose histogram is too small for its range.
@@ -64,7 +64,7 @@ pub struct System {
     /// The light.
     pub link: Link,
     /// What must be reached.
-    pub goal: Goal,
+    pub goal: RangingGoal,
     /// The formulas.
     pub models: Models,
     /// Bins M.
@@ -77,7 +77,7 @@ pub struct System {
 
 /// What a step is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Purpose {
+pub enum StepPurpose {
     /// Finding the echo among coarse bins.
     Detect {
         /// Bins that may hold the echo.
@@ -91,9 +91,9 @@ pub enum Purpose {
 
 /// One exposure of a scheme, before overflow splits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct ExposureStep {
     /// What it is for.
-    pub purpose: Purpose,
+    pub purpose: StepPurpose,
     /// The range whose light it uses, m.
     pub range_m: f64,
     /// Laser cycles it needs; infinite where no number is enough.
@@ -106,7 +106,7 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cost {
     /// Its steps in order.
-    pub steps: Vec<Step>,
+    pub steps: Vec<ExposureStep>,
     /// The allowed chance of overflow in a step: that of missing the target, 1 − P_D.
     pub overflow_chance: f64,
 }
@@ -120,7 +120,8 @@ impl Cost {
     /// Exposures once steps are split so that bins of `bin_bits` do not overflow; each is read out once.
     pub fn exposures(&self, bin_bits: u32) -> f64 {
         let most = largest_mean(bin_bits, self.overflow_chance);
-        let of_step = |step: &Step| (step.laser_cycles * step.fullest / most).ceil().max(1.0);
+        let of_step =
+            |step: &ExposureStep| (step.laser_cycles * step.fullest / most).ceil().max(1.0);
         self.steps.iter().map(of_step).sum()
     }
 }
@@ -128,7 +129,7 @@ impl Cost {
 /// The greatest mean of a Poisson count that exceeds a counter of `bin_bits` with no more than `chance`.
 pub fn largest_mean(bin_bits: u32, chance: f64) -> f64 {
     let capacity = (1u64 << bin_bits) - 1;
-    let overflows = |mean: f64| Counts::poisson(mean, 0.0).above(capacity) > chance;
+    let overflows = |mean: f64| Counts::poisson(mean, 0.0).tail_above(capacity) > chance;
     let (mut low, mut high) = (0.0, capacity as f64);
     if !overflows(high) {
         return high;
@@ -158,7 +159,7 @@ pub fn sliding_reduction(bins: u32, windows: u32, overlap: u32) -> f64 {
 
 impl System {
     /// A system of `bins` bins of `bin_s` whose window is just as long.
-    pub fn new(link: Link, goal: Goal, models: Models, bins: u32, bin_s: f64) -> Self {
+    pub fn new(link: Link, goal: RangingGoal, models: Models, bins: u32, bin_s: f64) -> Self {
         System {
             link,
             goal,
@@ -173,7 +174,7 @@ impl System {
         self.link.signal / (range_m * range_m)
     }
 
-    fn cost(&self, steps: Vec<Step>) -> Cost {
+    fn cost(&self, steps: Vec<ExposureStep>) -> Cost {
         Cost {
             steps,
             overflow_chance: 1.0 - self.goal.detection,
@@ -181,7 +182,7 @@ impl System {
     }
 
     /// Laser cycles that measure a target at `range_m` to the wanted precision, the bins being in the right place.
-    pub fn measure(&self, range_m: f64) -> Step {
+    pub fn measure(&self, range_m: f64) -> ExposureStep {
         let signal = self.signal(range_m);
         let background = self.link.background_hz * self.bin_s;
         let sigma_s = self.link.pulse_sigma_s;
@@ -189,8 +190,8 @@ impl System {
             (self.models.precision)(1e9 * self.bin_s, 1e9 * sigma_s, background, signal);
         let wanted_ns = 2e9 * self.goal.precision_m / SPEED_OF_LIGHT_M_PER_S;
         let in_peak = libm::erf(0.5 * self.bin_s / (sigma_s * std::f64::consts::SQRT_2));
-        Step {
-            purpose: Purpose::Measure,
+        ExposureStep {
+            purpose: StepPurpose::Measure,
             range_m,
             // Both bounds shrink with the square root of the counts.
             laser_cycles: (one_cycle_ns / wanted_ns).powi(2).ceil(),
@@ -199,15 +200,15 @@ impl System {
     }
 
     /// Laser cycles that find a target at the far end `range_m` of one of `candidates` bins of `bin_m`.
-    pub(crate) fn detect(&self, bin_m: f64, candidates: u32, range_m: f64) -> Step {
+    pub(crate) fn detect(&self, bin_m: f64, candidates: u32, range_m: f64) -> ExposureStep {
         let light = PerCycle {
             signal: self.signal(range_m),
             background: self.link.background_hz * 2.0 * bin_m / SPEED_OF_LIGHT_M_PER_S,
             bins: candidates,
         };
         let cycles = laser_cycles_for(self.goal.detection, &light, self.models.detection);
-        Step {
-            purpose: Purpose::Detect { candidates, bin_m },
+        ExposureStep {
+            purpose: StepPurpose::Detect { candidates, bin_m },
             range_m,
             laser_cycles: cycles.map_or(f64::INFINITY, |n| n as f64),
             fullest: light.signal + light.background,
@@ -253,7 +254,7 @@ impl System {
 
 #[cfg(test)]
 mod tests {
-    use super::super::detection::{Model, Ties, probability};
+    use super::super::detection::{DetectionModel, Ties, probability};
     use super::super::precision::{cramer_rao, thompson};
     use super::*;
     use proptest::prelude::*;
@@ -264,13 +265,13 @@ mod tests {
             background_hz: 8e6,
             pulse_sigma_s: 4.5e-9 / 2.354_820_045_030_949,
         };
-        let goal = Goal {
+        let goal = RangingGoal {
             precision_m: 0.1,
             detection: 0.997,
         };
         let models = Models {
             precision,
-            detection: Model::Poisson(Ties::Random),
+            detection: DetectionModel::Poisson(Ties::Random),
         };
         System::new(link, goal, models, 8, 2.6e-9)
     }
@@ -298,8 +299,8 @@ mod tests {
         let candidates = |z_m: f64| -> Vec<u32> {
             let steps = system.zooming(z_m).steps;
             let detects = steps.iter().filter_map(|step| match step.purpose {
-                Purpose::Detect { candidates, .. } => Some(candidates),
-                Purpose::Measure => None,
+                StepPurpose::Detect { candidates, .. } => Some(candidates),
+                StepPurpose::Measure => None,
             });
             detects.collect()
         };
@@ -349,7 +350,7 @@ mod tests {
         for bits in [1, 8, 12, 14] {
             let mean = largest_mean(bits, 0.003);
             let capacity = (1u64 << bits) - 1;
-            let chance = |mean: f64| Counts::poisson(mean, 0.0).above(capacity);
+            let chance = |mean: f64| Counts::poisson(mean, 0.0).tail_above(capacity);
             assert!(
                 chance(mean) <= 0.003 && chance(mean * 1.001) > 0.003,
                 "{bits}: {mean}"
@@ -359,8 +360,8 @@ mod tests {
 
     #[test]
     fn overflow_splits_a_step_into_whole_exposures() {
-        let step = |laser_cycles| Step {
-            purpose: Purpose::Measure,
+        let step = |laser_cycles| ExposureStep {
+            purpose: StepPurpose::Measure,
             range_m: 1.0,
             laser_cycles,
             fullest: 1.0,

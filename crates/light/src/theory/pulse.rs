@@ -60,7 +60,7 @@ impl Pulse {
         match self {
             Pulse::Gaussian { sigma_ns } => gaussian_bin(*sigma_ns, from_ns, to_ns),
             Pulse::Measured(pulse) => LnBin {
-                share: log((pulse.below(to_ns) - pulse.below(from_ns)).max(0.0)),
+                share: log((pulse.cumulative(to_ns) - pulse.cumulative(from_ns)).max(0.0)),
                 slope: log((pulse.density(from_ns) - pulse.density(to_ns)).abs()),
             },
         }
@@ -112,7 +112,7 @@ pub struct MeasuredPulse {
 /// Why samples make no pulse.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum PulseError {
+pub enum PulseSamplesError {
     /// Too few samples, or no spacing.
     #[error("a measured pulse needs at least three samples and a positive time step between them")]
     TooShort,
@@ -134,19 +134,19 @@ impl MeasuredPulse {
     ///
     /// # Errors
     /// When there are fewer than three samples, one is negative, or the pulse does not begin and end at zero.
-    pub fn new(step_ns: f64, samples: &[f64]) -> Result<Self, PulseError> {
+    pub fn new(step_ns: f64, samples: &[f64]) -> Result<Self, PulseSamplesError> {
         if samples.len() < 3 || !(step_ns > 0.0 && step_ns.is_finite()) {
-            return Err(PulseError::TooShort);
+            return Err(PulseSamplesError::TooShort);
         }
         if let Some(index) = samples.iter().position(|s| !(*s >= 0.0 && s.is_finite())) {
-            return Err(PulseError::Negative {
+            return Err(PulseSamplesError::Negative {
                 index,
                 value: samples[index],
             });
         }
         let area: f64 = step_ns * samples.iter().sum::<f64>();
         if samples[0] != 0.0 || samples[samples.len() - 1] != 0.0 || area == 0.0 {
-            return Err(PulseError::Open);
+            return Err(PulseSamplesError::Open);
         }
         let density: Vec<f64> = samples.iter().map(|s| s / area).collect();
         let mut below = vec![0.0; density.len()];
@@ -192,7 +192,7 @@ impl MeasuredPulse {
         })
     }
 
-    fn below(&self, t_ns: f64) -> f64 {
+    fn cumulative(&self, t_ns: f64) -> f64 {
         match self.locate(t_ns) {
             Some((i, x)) => {
                 let here = self.density[i] + 0.5 * x * (self.density[i + 1] - self.density[i]);

@@ -198,7 +198,7 @@ fn at_least(least: u64, cells: u64, chance: f64) -> f64 {
         cycles: cells,
         photons_per_cycle: -libm::log1p(-chance),
     };
-    counts.above(least - 1)
+    counts.tail_above(least - 1)
 }
 
 /// Share of a pulse in the best of all stretches of `width` bins, averaged over where it lies, over √width.
@@ -327,7 +327,7 @@ mod tests {
     /// stretches that are left out.
     #[test]
     fn the_power_is_how_often_drawn_echoes_are_found() {
-        use crate::photon::{Poisson, Purpose, random_stream};
+        use crate::photon::{Poisson, RandomPurpose, random_stream};
         let ln_false_alarm = 1e-3f64.ln();
         for (bins, stretch, beside, laser_cycles) in [
             (16, 0.049, 0.04, 8000u32),
@@ -349,7 +349,7 @@ mod tests {
             let power = scan.power(&chances, ln_false_alarm);
             let runs = 4000;
             let found = (0..runs).filter(|&run| {
-                let mut random = random_stream(5, Purpose::Photons, run, 0);
+                let mut random = random_stream(5, RandomPurpose::Photons, run, 0);
                 let counts: Vec<u32> = (0..bins)
                     .map(|bin| {
                         let chance = if bin / 2 == 1 { stretch } else { beside };

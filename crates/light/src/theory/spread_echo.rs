@@ -207,7 +207,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::theory::detection::{Model, PerCycle, Ties, probability};
+    use crate::theory::detection::{DetectionModel, PerCycle, Ties, probability};
 
     fn echo(signal: f64, background: f64, sigma_bins: f64) -> SpreadEcho {
         SpreadEcho {
@@ -300,7 +300,7 @@ mod tests {
         ) {
             let short = echo(signal, background, 0.0).detection(cycles, Hits::OneACycle);
             let light = PerCycle { signal, background, bins: 16 };
-            let one_bin = probability(&light, cycles, Model::Bernoulli(Ties::Random));
+            let one_bin = probability(&light, cycles, DetectionModel::Bernoulli(Ties::Random));
             // The neighbour's lucky peak counts as right too, one of fifteen.
             let neighbour = one_bin.miss / 15.0;
             prop_assert!((short.probability - one_bin.probability - neighbour).abs() < 1e-6);
@@ -317,9 +317,9 @@ mod tests {
     #[test]
     fn very_bright_echoes_are_found_photon_by_photon_and_are_a_lot_in_full_bins() {
         for signal in [100.0, 1e4, 1e8] {
-            let of = |hits| echo(signal, 0.1, 0.3).detection(200, hits);
-            assert!(of(Hits::All).probability > 0.999_999, "{signal}");
-            let full = of(Hits::OneACycle);
+            let detection = |hits| echo(signal, 0.1, 0.3).detection(200, hits);
+            assert!(detection(Hits::All).probability > 0.999_999, "{signal}");
+            let full = detection(Hits::OneACycle);
             assert!(
                 full.probability > 0.3 && full.probability <= 1.0,
                 "{signal} {full:?}"
@@ -332,9 +332,9 @@ mod tests {
     fn its_places_are_enough() {
         for (sigma, error) in [(0.05, 5e-3), (0.3, 1e-4), (0.9, 5e-3), (1.9, 5e-3)] {
             let echo = echo(0.05, 0.05, sigma);
-            let of =
+            let detection_at =
                 |k: u32| echo.at_place(8.0 + (f64::from(k) + 0.5) / 512.0, 100, Hits::OneACycle);
-            let many = (0..256).map(|k| of(k).0).sum::<f64>() / 256.0;
+            let many = (0..256).map(|k| detection_at(k).0).sum::<f64>() / 256.0;
             let found = echo.detection(100, Hits::OneACycle).probability;
             assert!((found - many).abs() < error, "{sigma}: {found} {many}");
         }
@@ -344,8 +344,11 @@ mod tests {
     fn laser_cycles_are_the_fewest() {
         let echo = echo(0.02, 0.05, 0.6);
         let cycles = echo.laser_cycles_for(0.99, Hits::OneACycle).unwrap();
-        let of = |cycles| echo.detection(cycles, Hits::OneACycle).probability;
-        assert!(of(cycles) >= 0.99 && of(cycles - 1) < 0.99, "{cycles}");
+        let probability = |cycles| echo.detection(cycles, Hits::OneACycle).probability;
+        assert!(
+            probability(cycles) >= 0.99 && probability(cycles - 1) < 0.99,
+            "{cycles}"
+        );
         assert_eq!(
             SpreadEcho {
                 signal: 0.0,

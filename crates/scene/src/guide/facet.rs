@@ -220,7 +220,7 @@ fn solve([a, b, d]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
     use proptest::prelude::*;
 
     const PITCH: Pitch = [4.4e-3; 2];
@@ -236,7 +236,7 @@ mod tests {
         let places = (0..9u32).map(|n| [f64::from(n % 3), f64::from(n / 3)]);
         let samples = (0..).zip(places).map(|(n, place)| {
             let at = [0, 1].map(|axis| (place[axis] - 1.0) / 3.0 + phase[axis]);
-            let error = sigma * normal(&mut random_stream(seed, Purpose::Guide, n, 98));
+            let error = sigma * normal(&mut random_stream(seed, RandomPurpose::Guide, n, 98));
             Sample {
                 at,
                 inverse: middle + slope[0] * at[0] + slope[1] * at[1] + error,
@@ -250,8 +250,8 @@ mod tests {
     /// The mean range by light over a plane, slowly: light goes with the cosine, which goes with q, and with q².
     fn mean_range_m(middle: f64, slope: [f64; 2]) -> f64 {
         const N: u32 = 200;
-        let at = |n: u32| (f64::from(n) + 0.5) / f64::from(N) - 0.5;
-        let places = (0..N).flat_map(|x| (0..N).map(move |y| (at(x), at(y))));
+        let offset = |n: u32| (f64::from(n) + 0.5) / f64::from(N) - 0.5;
+        let places = (0..N).flat_map(|x| (0..N).map(move |y| (offset(x), offset(y))));
         let (light, moment) = places.fold((0.0, 0.0), |(light, moment), (x, y)| {
             let q = middle + slope[0] * x + slope[1] * y;
             (light + q.powi(3), moment + q.powi(2))
@@ -396,25 +396,25 @@ mod tests {
 
     #[test]
     fn of_two_surfaces_the_brighter_one_is_meant_and_doubt_is_told() {
-        let of = |ranges_m| estimate(&mut columns(ranges_m), PITCH).unwrap();
+        let facet = |ranges_m| estimate(&mut columns(ranges_m), PITCH).unwrap();
         // Nine times as much light from the near one.
-        let (range_m, sigma_m) = of([Some(20.0), Some(20.0), Some(40.0)]);
+        let (range_m, sigma_m) = facet([Some(20.0), Some(20.0), Some(40.0)]);
         assert!(
             (range_m - 20.0).abs() < 0.3 && sigma_m > 1.0,
             "{range_m} {sigma_m}"
         );
         // Twice as much from the far one.
-        let (range_m, sigma_m) = of([Some(100.0), Some(100.0), Some(80.0)]);
+        let (range_m, sigma_m) = facet([Some(100.0), Some(100.0), Some(80.0)]);
         assert!((range_m - 100.0).abs() < 4.0, "{range_m}");
         assert!(3.0 * sigma_m > 20.0, "{sigma_m}");
         // A post before a house that the right camera does not see beside it is no steep plane.
-        let (range_m, _) = of([Some(45.0), None, Some(180.0)]);
+        let (range_m, _) = facet([Some(45.0), None, Some(180.0)]);
         assert!((range_m - 45.0).abs() < 1.0, "{range_m}");
     }
 
     #[test]
     fn what_may_be_a_surface_beside_is_not_told() {
-        let of = |ranges_m, rims: &[usize]| {
+        let facet = |ranges_m, rims: &[usize]| {
             let mut samples = columns(ranges_m);
             for (number, sample) in samples.iter_mut().enumerate() {
                 sample.is_rim = rims.contains(&(number % 3));
@@ -423,11 +423,11 @@ mod tests {
         };
         let mixed = [Some(20.0), Some(20.0), Some(110.0)];
         // The near one is sure in one of its columns.
-        assert_eq!(of(mixed, &[1]), of(mixed, &[]));
-        assert_eq!(of(mixed, &[0, 1]), None);
+        assert_eq!(facet(mixed, &[1]), facet(mixed, &[]));
+        assert_eq!(facet(mixed, &[0, 1]), None);
         let plane = [Some(20.0); 3];
-        assert_eq!(of(plane, &[0, 1, 2]), None);
-        assert_eq!(of(plane, &[0, 1]), of(plane, &[]));
+        assert_eq!(facet(plane, &[0, 1, 2]), None);
+        assert_eq!(facet(plane, &[0, 1]), facet(plane, &[]));
     }
 
     #[test]

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use super::facet::{self, Sample};
 use super::{Guide, GuideError, GuideInput, GuideMap};
-use crate::photon::{PixelLight, Poisson, Purpose, normal, random_stream};
+use crate::photon::{PixelLight, Poisson, RandomPurpose, normal, random_stream};
 use crate::scene::{DVec3, GroundTruth, Scene};
 use crate::settings::Range::Within;
 use crate::settings::keys;
@@ -79,7 +79,7 @@ impl IntensityStereo {
         };
         let pixels = light.par_iter().enumerate().map(|(pixel, light)| {
             let mean = mean(light);
-            let mut random = random_stream(input.seed, Purpose::Guide, pixel as u32, draws);
+            let mut random = random_stream(input.seed, RandomPurpose::Guide, pixel as u32, draws);
             if mean < MANY {
                 f64::from(Poisson::new(mean).draw(&mut random))
             } else {
@@ -102,7 +102,7 @@ impl IntensityStereo {
 fn seen_from(scene: &Scene, from_m: DVec3) -> Scene {
     let mut moved = scene.clone();
     moved.rig.velocity_m_s = from_m;
-    moved.at(1.0)
+    moved.snapshot(1.0)
 }
 
 /// Whether the pattern about a pixel stands out of the counts' noise, whose standard deviation is ½ after the root.
@@ -175,7 +175,7 @@ impl Guide for IntensityStereo {
             let within = |at: u32| (at * self.finer..(at + 1) * self.finer).map(|at| at as usize);
             let pixels = within(row).flat_map(|row| within(col).map(move |col| (row, col)));
             let samples = pixels.filter_map(|(y, x)| {
-                let disparity_px = f64::from(found.at(y, x)?);
+                let disparity_px = f64::from(found.disparity_px(y, x)?);
                 let at = [x as f64 + 0.5, y as f64 + 0.5];
                 let metre_pixels = metre_pixels * lidar.at_unit_depth((at[0], at[1])).length();
                 let off = |axis: usize, first: u32| at[axis] / finer - f64::from(first) - 0.5;
@@ -296,7 +296,7 @@ mod tests {
     /// Noise alone has a fifth of the variance that is asked for.
     #[test]
     fn a_pattern_stands_out_of_noise() {
-        let stream = |pixel| random_stream(7, Purpose::Guide, pixel, 0);
+        let stream = |pixel| random_stream(7, RandomPurpose::Guide, pixel, 0);
         let noisy = |mean: &dyn Fn(u32) -> f64| -> f64 {
             let counts = (0..1024)
                 .map(|pixel| f64::from(Poisson::new(mean(pixel)).draw(&mut stream(pixel))));

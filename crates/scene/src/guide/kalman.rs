@@ -169,7 +169,7 @@ impl Guide for Kalman {
 mod tests {
     use super::*;
     use crate::guide::test_scenes::wall_at;
-    use crate::photon::{Purpose, normal, random_stream};
+    use crate::photon::{RandomPurpose, normal, random_stream};
 
     /// Frames `dt_s` apart, in which every macropixel measures `range_m(frame)`.
     fn frames(
@@ -230,7 +230,7 @@ mod tests {
         let mut last_m = vec![0.0; PIXELS];
         let mut measured = vec![vec![None; PIXELS]; count];
         for pixel in 0..PIXELS {
-            let mut random = random_stream(5, Purpose::Guide, pixel as u32, 99);
+            let mut random = random_stream(5, RandomPurpose::Guide, pixel as u32, 99);
             let (mut range_m, mut speed_m_s) = (60.0, guide.speed_m_s * normal(&mut random));
             for (frame, measured) in measured.iter_mut().enumerate() {
                 if frame > 0 {
@@ -298,7 +298,7 @@ mod tests {
             (1, 0) => Some(40.0),
             _ => None,
         });
-        let at = |time_s| {
+        let estimate = |time_s| {
             let input = GuideInput {
                 time_s,
                 earlier: &earlier,
@@ -306,12 +306,12 @@ mod tests {
             };
             Kalman::default().estimate(&input).unwrap()
         };
-        let soon = at(0.6);
+        let soon = estimate(0.6);
         assert_eq!(soon.range_m, [Some(57.0), Some(40.0)]);
         // 10 m/s in 0.1 s.
         assert!((soon.sigma_m[0] - 1.0).abs() < 0.02, "{}", soon.sigma_m[0]);
-        assert_eq!(at(1.2).range_m, [Some(57.0), None]);
-        assert_eq!(at(2.0).range_m, [None, None]);
+        assert_eq!(estimate(1.2).range_m, [Some(57.0), None]);
+        assert_eq!(estimate(2.0).range_m, [None, None]);
     }
 
     /// Seen from a rig that moves sideways, near targets move by more than far ones.

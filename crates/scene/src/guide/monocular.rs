@@ -15,7 +15,7 @@
 
 use super::{Guide, GuideError, GuideInput, GuideMap};
 use crate::guide::StereoRig;
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::GroundTruth;
 use crate::settings::Range::{Above, Within};
 use crate::settings::keys;
@@ -59,7 +59,12 @@ impl Monocular {
     fn error(&self, seed: u64, row: u32, col: u32) -> f64 {
         let draw = |what: usize, row: u32, col: u32| {
             let index = row << 16 | col;
-            normal(&mut random_stream(seed, Purpose::Guide, index, DRAWS[what]))
+            normal(&mut random_stream(
+                seed,
+                RandomPurpose::Guide,
+                index,
+                DRAWS[what],
+            ))
         };
         // Between the corners of a patch, weights linear in either direction, made up to a variance of one.
         let (r, c) = (row / self.patch, col / self.patch);

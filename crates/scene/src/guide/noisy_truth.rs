@@ -1,7 +1,7 @@
 //! The true distance with a Gaussian error: a guide whose claim is right by construction, to try windows and fusion on.
 
 use super::{Guide, GuideError, GuideInput, GuideMap};
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::GroundTruth;
 use crate::settings::Range::Within;
 use crate::settings::keys;
@@ -32,7 +32,7 @@ impl Guide for NoisyTruth {
         let estimates = (0..).zip(&truth.range_m).map(|(pixel, range_m)| {
             let true_m = (*range_m)?;
             let sigma_m = libm::hypot(self.sigma_m, self.sigma_per_m * true_m);
-            let mut random = random_stream(input.seed, Purpose::Guide, pixel, DRAWS);
+            let mut random = random_stream(input.seed, RandomPurpose::Guide, pixel, DRAWS);
             Some(((true_m + sigma_m * normal(&mut random)).max(0.0), sigma_m))
         });
         Ok(GuideMap::new(input.rows, input.cols, estimates))
@@ -80,7 +80,12 @@ mod tests {
             let true_m = truth.range_m[pixel].expect("a wall");
             let (range_m, sigma_m) = map.estimate_of(pixel).expect("an estimate");
             assert!((sigma_m / (0.16 + 1e-4 * true_m * true_m).sqrt() - 1.0).abs() < 1e-12);
-            let draw = normal(&mut random_stream(3, Purpose::Guide, pixel as u32, DRAWS));
+            let draw = normal(&mut random_stream(
+                3,
+                RandomPurpose::Guide,
+                pixel as u32,
+                DRAWS,
+            ));
             assert!((range_m - true_m - sigma_m * draw).abs() < 1e-9);
         }
     }

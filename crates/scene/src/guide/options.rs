@@ -17,7 +17,7 @@ use crate::settings::{Document, Key, Settings, keys};
 /// A guide that goes by a name.
 #[derive(Debug)]
 #[non_exhaustive]
-pub struct Kind {
+pub struct GuideKind {
     /// Name.
     pub name: &'static str,
     /// What it is, without a full stop.
@@ -27,10 +27,10 @@ pub struct Kind {
     make: fn(&Document) -> Result<Arc<dyn Guide>, InputError>,
 }
 
-impl Kind {
+impl GuideKind {
     /// A guide that is its own settings.
-    const fn of<G: Guide + Settings + 'static>(name: &'static str, what: &'static str) -> Self {
-        Kind {
+    const fn new<G: Guide + Settings + 'static>(name: &'static str, what: &'static str) -> Self {
+        GuideKind {
             name,
             what,
             keys: G::KEYS,
@@ -40,15 +40,15 @@ impl Kind {
 }
 
 /// All guides.
-pub const KINDS: &[Kind] = &[
-    Kind {
+pub const KINDS: &[GuideKind] = &[
+    GuideKind {
         name: "stereo",
         what: "The scene's camera pair, with errors drawn at random; its keys are the scene's",
         keys: Nothing::KEYS,
         make: |document| read::<Nothing>(document).map(|_| Arc::new(BehaviouralStereo) as _),
     },
-    Kind::of::<NoisyTruth>("truth", "The true distance with a Gaussian error"),
-    Kind {
+    GuideKind::new::<NoisyTruth>("truth", "The true distance with a Gaussian error"),
+    GuideKind {
         make: |document| {
             let guide: MatchedStereo = read(document)?;
             guide
@@ -56,22 +56,22 @@ pub const KINDS: &[Kind] = &[
                 .map_err(|message| document.refuse("paths", message))?;
             Ok(Arc::new(guide))
         },
-        ..Kind::of::<MatchedStereo>(
+        ..GuideKind::new::<MatchedStereo>(
             "matched",
             "The scene's camera pair: images are rendered and matched",
         )
     },
-    Kind::of::<Monocular>(
+    GuideKind::new::<Monocular>(
         "monocular",
         "Depth from one image: everywhere, but with large errors",
     ),
-    Kind::of::<Radar>("radar", "Good range, coarse angle"),
-    Kind::of::<IntensityStereo>("intensity", "The intensity images of two lidars, matched"),
-    Kind::of::<Kalman>(
+    GuideKind::new::<Radar>("radar", "Good range, coarse angle"),
+    GuideKind::new::<IntensityStereo>("intensity", "The intensity images of two lidars, matched"),
+    GuideKind::new::<Kalman>(
         "kalman",
         "Prediction from earlier frames; has no estimate in the first",
     ),
-    Kind {
+    GuideKind {
         name: "file",
         what: "A map of distances from a .npy file",
         keys: FileOptions::KEYS,
@@ -130,7 +130,7 @@ pub fn parse(text: &str, source: &str) -> Result<Arc<dyn Guide>, InputError> {
         return Err(InputError::new(source, message));
     };
     let option = format!("{source} {text}");
-    let mut document = Document::of(&option, Table::new());
+    let mut document = Document::from_table(&option, Table::new());
     for assignment in settings.split(',').filter(|part| !part.is_empty()) {
         document.assign(assignment, &option)?;
     }

@@ -28,7 +28,7 @@ impl MatchedPair {
         let focal_baseline_px_m = camera.focal_px * baseline_m;
         let pixels = (0..map.height()).flat_map(|row| (0..map.width()).map(move |col| (row, col)));
         let points = pixels.filter_map(|(row, col)| {
-            let disparity_px = f64::from(map.at(row, col)?);
+            let disparity_px = f64::from(map.disparity_px(row, col)?);
             let depth_m = focal_baseline_px_m / (disparity_px + offset_px);
             if depth_m <= 0.0 || !depth_m.is_finite() {
                 return None;

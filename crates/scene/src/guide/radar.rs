@@ -21,7 +21,7 @@
 use rayon::prelude::*;
 
 use super::{Guide, GuideError, GuideInput, GuideMap};
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::{DVec3, Ray, Scene, Stage};
 use crate::settings::Range::{Above, Within};
 use crate::settings::keys;
@@ -92,8 +92,8 @@ impl Radar {
     /// What comes back within a beam.
     fn echoes(&self, stage: &Stage, (col, row): (i32, i32)) -> Vec<Echo> {
         let angles = |beam: i32, width_deg: f64| {
-            let at = move |n: u32| (f64::from(n) + 0.5) / f64::from(RAYS_ACROSS) - 0.5;
-            (0..RAYS_ACROSS).map(move |n| ((f64::from(beam) + at(n)) * width_deg).to_radians())
+            let offset = move |n: u32| (f64::from(n) + 0.5) / f64::from(RAYS_ACROSS) - 0.5;
+            (0..RAYS_ACROSS).map(move |n| ((f64::from(beam) + offset(n)) * width_deg).to_radians())
         };
         let rays = angles(row, self.elevation_beam_deg).flat_map(|elevation| {
             angles(col, self.azimuth_beam_deg).map(move |azimuth| {
@@ -179,13 +179,13 @@ impl Guide for Radar {
         let mut each = beams.clone();
         each.sort_unstable();
         each.dedup();
-        let stage = Stage::of(input.scene);
+        let stage = Stage::new(input.scene);
         let found: Vec<Option<(f64, f64)>> = (0..each.len() as u32)
             .into_par_iter()
             .map(|number| {
                 let echoes = self.echoes(&stage, each[number as usize]);
                 let (range_m, spread_m2) = self.strongest(&echoes)?;
-                let mut random = random_stream(input.seed, Purpose::Guide, number, DRAWS);
+                let mut random = random_stream(input.seed, RandomPurpose::Guide, number, DRAWS);
                 let measured_m = range_m + self.range_sigma_m * normal(&mut random);
                 let sigma_m = (self.range_sigma_m.powi(2) + spread_m2).sqrt();
                 Some((measured_m.max(0.0), sigma_m))
@@ -230,7 +230,7 @@ mod tests {
         let radar = Radar::default();
         let scene = wall_at(50.0);
         for beam in [(0, 0), (3, -1), (-2, 2)] {
-            let echoes = radar.echoes(&Stage::of(&scene), beam);
+            let echoes = radar.echoes(&Stage::new(&scene), beam);
             assert_eq!(echoes.len() as u32, RAYS_ACROSS * RAYS_ACROSS);
             // A wall is met at 50 m over the cosine of the angle off the axis; so are all rays of the beam's grid.
             let angle = |beam: i32, n: u32, width_deg: f64| {

@@ -17,7 +17,7 @@ use smallvec::SmallVec;
 use super::GuideInput;
 use super::right_camera::RightCamera;
 use crate::numerics::branchless;
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::{Bounds, PinholeCamera, Ray, SKY_REFLECTIVITY, Scene, Stage};
 use crate::stereo::GreyImage;
 
@@ -140,13 +140,13 @@ fn radiances(
         .iter()
         .any(|o| o.transmittance > 0.0 || o.mirror > 0.0);
     let (width, height) = (crop.width as usize, crop.height as usize);
-    let bounds = Bounds::of(scene, ray(crop.middle(0, 0)).origin);
-    let stage = Stage::of(scene);
+    let bounds = Bounds::from_scene(scene, ray(crop.middle(0, 0)).origin);
+    let stage = Stage::new(scene);
     let radiance = |ray: &Ray, candidates: &_| {
         if !has_panes {
             match stage.hit_of(ray, candidates) {
                 Some(hit) => {
-                    let seen = surface(&stage, ray.at(hit.range_m), &hit, grain, pixel_rad);
+                    let seen = surface(&stage, ray.point(hit.range_m), &hit, grain, pixel_rad);
                     seen + air(&stage, hit.range_m)
                 }
                 None => SKY_REFLECTIVITY,
@@ -274,7 +274,7 @@ fn expose(
     let rows = radiances.par_chunks(width).enumerate();
     let pixels: Vec<u16> = rows
         .flat_map_iter(|(row, radiances)| {
-            let mut random = random_stream(seed, Purpose::Stereo, row as u32, side);
+            let mut random = random_stream(seed, RandomPurpose::Stereo, row as u32, side);
             radiances.iter().map(move |&radiance| {
                 let signal_e = f64::from(radiance) * electrons;
                 let noise_e = (signal_e + READ_NOISE_E * READ_NOISE_E * binned).sqrt();
@@ -353,8 +353,12 @@ mod tests {
     fn clouds_are_smooth_and_as_strong_as_is_said() {
         let mut squares = [0.0; 3];
         for number in 0..10_000 {
-            let at = |n: u32| f64::from(n * 7919 % 10_007) * 0.0371 - 150.0;
-            let point = DVec3::new(at(number), at(number + 3), at(number + 7));
+            let coordinate = |n: u32| f64::from(n * 7919 % 10_007) * 0.0371 - 150.0;
+            let point = DVec3::new(
+                coordinate(number),
+                coordinate(number + 3),
+                coordinate(number + 7),
+            );
             let here = cloud(point, 5);
             assert!(here.abs() <= 1.0);
             for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -413,7 +417,7 @@ mod tests {
                     (f64::from(fog[pixel]) / wanted - 1.0).abs() < 1e-5,
                     "{pixel}"
                 );
-                let grain = grain_at(ray.at(hit.range_m), 2.0 / camera.focal_px * hit.range_m);
+                let grain = grain_at(ray.point(hit.range_m), 2.0 / camera.focal_px * hit.range_m);
                 let wanted = clear * (1.0 + 0.4 * grain).max(0.0);
                 assert!(
                     (f64::from(grainy[pixel]) - wanted).abs() < 1e-5,

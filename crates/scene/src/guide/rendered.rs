@@ -142,12 +142,12 @@ impl MatchedStereo {
         let camera = stereo.camera();
         let focal_baseline = camera.focal_px * stereo.baseline_m;
         let accepted = stereo.min_disparity_px..=stereo.max_disparity_px;
-        let answered = answered(&map);
+        let answered = answered_share(&map);
         let rims = map.rims(RIM_PX, false);
         let mut points = Vec::with_capacity(map.matched());
         for row in 0..map.height() {
             for col in 0..map.width() {
-                let Some(binned_px) = map.at(row, col) else {
+                let Some(binned_px) = map.disparity_px(row, col) else {
                     continue;
                 };
                 let disparity_px = f64::from(binned_px) * f64::from(crop.binning);
@@ -175,10 +175,11 @@ impl MatchedStereo {
 }
 
 /// The share of the pixels about each one that have an answer.
-fn answered(map: &DisparityMap) -> Vec<f64> {
+fn answered_share(map: &DisparityMap) -> Vec<f64> {
     let (width, height) = (map.width(), map.height());
     let about = |at: usize, size: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(size);
-    let has_answer = |row: usize, col: usize| f64::from(u8::from(map.at(row, col).is_some()));
+    let has_answer =
+        |row: usize, col: usize| f64::from(u8::from(map.disparity_px(row, col).is_some()));
     let mut of_rows = vec![0.0; width * height];
     for (at, share) in of_rows.iter_mut().enumerate() {
         let cols = about(at % width, width);
@@ -380,7 +381,7 @@ mod tests {
             let px = |&answer: &bool| if answer { 7.0 } else { f32::NAN };
             let px = answers.iter().take(width * height).map(px).collect();
             let map = DisparityMap { width, height, px };
-            for (at, found) in answered(&map).into_iter().enumerate() {
+            for (at, found) in answered_share(&map).into_iter().enumerate() {
                 let is_near = |a: usize, b: usize| a.abs_diff(b) <= AROUND;
                 let about = (0..width * height)
                     .filter(|other| is_near(other / width, at / width) && is_near(other % width, at % width));

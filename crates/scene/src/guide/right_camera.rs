@@ -75,29 +75,29 @@ mod tests {
                 baseline_error_m: errors.3, focal_error_percent: errors.4, ..Stereo::default()
             };
             let right = RightCamera::new(&stereo);
-            let seen = right.sees_at(right.ray(at).at(range_m)).unwrap();
+            let seen = right.sees_at(right.ray(at).point(range_m)).unwrap();
             prop_assert!((seen.0 - at.0).hypot(seen.1 - at.1) < 1e-6);
         }
     }
 
     #[test]
     fn errors_move_the_image_the_way_their_names_say() {
-        let at = |stereo: Stereo| {
+        let image_point = |stereo: Stereo| {
             let ahead = DVec3::new(1.0, 0.0, 40.0);
             RightCamera::new(&stereo).sees_at(ahead).unwrap()
         };
         let none = Stereo::default();
-        assert_eq!(at(none), (720.0, 540.0));
+        assert_eq!(image_point(none), (720.0, 540.0));
         // Turned outwards, to the right, it sees everything further left.
         assert!(
-            at(Stereo {
+            image_point(Stereo {
                 yaw_error_deg: 0.1,
                 ..none
             })
             .0 < 719.0
         );
         assert!(
-            at(Stereo {
+            image_point(Stereo {
                 baseline_error_m: 0.1,
                 ..none
             })
@@ -105,7 +105,7 @@ mod tests {
         );
         // Turned up it sees everything further down.
         assert!(
-            at(Stereo {
+            image_point(Stereo {
                 pitch_error_deg: 0.1,
                 ..none
             })

@@ -15,7 +15,7 @@
 use glam::DVec3;
 
 use super::right_camera::RightCamera;
-use crate::photon::{Purpose, normal, random_stream};
+use crate::photon::{RandomPurpose, normal, random_stream};
 use crate::scene::{PinholeCamera, Ray, Scene, Stage};
 
 /// How much nearer than the expected point the right camera's view may end, as a share of the
@@ -51,7 +51,7 @@ impl<'a> StereoRig<'a> {
     /// The rig of `scene`; equal seeds give equal errors.
     pub fn new(scene: &'a Scene, seed: u64) -> Self {
         StereoRig {
-            stage: Stage::of(scene),
+            stage: Stage::new(scene),
             camera: scene.stereo.camera(),
             right: RightCamera::new(&scene.stereo),
             seed,
@@ -94,7 +94,7 @@ impl<'a> StereoRig<'a> {
     fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
         let stereo = &self.stage.scene.stereo;
         let ray = Ray::new(stereo.position_m, self.camera.at_unit_depth(at));
-        let point_m = ray.at(self.stage.range_to_hit(&ray)?);
+        let point_m = ray.point(self.stage.range_to_hit(&ray)?);
         Some(at.0 - self.seen_by_right_camera(point_m)?)
     }
 
@@ -112,7 +112,7 @@ impl<'a> StereoRig<'a> {
     fn matched(&self, row: u32, col: u32, true_disparity_px: f64) -> Option<f64> {
         let stereo = &self.stage.scene.stereo;
         let pixel = row * self.camera.width + col;
-        let mut random = random_stream(self.seed, Purpose::Stereo, pixel, 0);
+        let mut random = random_stream(self.seed, RandomPurpose::Stereo, pixel, 0);
         let noisy_px = true_disparity_px + stereo.disparity_sigma_px * normal(&mut random);
         let steps = f64::from(stereo.subpixel_steps);
         let disparity_px = (noisy_px * steps).round() / steps;

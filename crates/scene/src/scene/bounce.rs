@@ -99,7 +99,7 @@ impl Stage<'_> {
             let Some(hit) = self.hit(&look) else {
                 continue;
             };
-            let second_m = look.at(hit.range_m);
+            let second_m = look.point(hit.range_m);
             let lit_m = second_m.length();
             let incidence = -hit.normal.dot(second_m) / lit_m;
             let sent_j_sr = self.scene.sent_j_sr(camera, second_m);
@@ -132,7 +132,7 @@ mod tests {
     fn bounced(scene: &Scene, across: u32) -> Vec<(f64, f64, f64)> {
         let truth = GroundTruth::render(scene, across, across);
         let budget = scene.photon_budget(across, across);
-        let of = |view: &std::sync::Arc<crate::scene::view::View>| {
+        let photons = |view: &std::sync::Arc<crate::scene::view::View>| {
             let all: f64 = view.bounced.iter().map(|b| b.exposure_j_m2).sum();
             let ways = view.bounced.iter().map(|b| b.exposure_j_m2 * b.way_m);
             let direct = view.glimpses.iter();
@@ -143,7 +143,7 @@ mod tests {
                 ways.sum::<f64>() / all,
             )
         };
-        truth.views.iter().map(of).collect()
+        truth.views.iter().map(photons).collect()
     }
 
     /// In a sphere about the lidar every place gets ρ of the pulse over the whole surface, wherever the laser shines: a ray from any place of a
@@ -248,7 +248,7 @@ mod tests {
             let all: Vec<_> = all
                 .map(|e| (e.photons, e.photons * e.arrival.as_range_m()))
                 .collect();
-            let sum = |of: fn(&(f64, f64)) -> f64| all.iter().map(of).sum::<f64>();
+            let sum = |term: fn(&(f64, f64)) -> f64| all.iter().map(term).sum::<f64>();
             (sum(|e| e.0), sum(|e| e.1) / sum(|e| e.0))
         };
         let ((direct, direct_m), (_, centre_m)) = (centre_m(0), centre_m(1024));

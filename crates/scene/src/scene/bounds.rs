@@ -32,7 +32,7 @@ pub(crate) struct Cone {
 
 impl Cone {
     /// About the direction `middle`, so wide that `others` are in it, unit vectors all.
-    pub(super) fn about(middle: DVec3, others: impl IntoIterator<Item = DVec3>) -> Self {
+    pub(super) fn enclosing(middle: DVec3, others: impl IntoIterator<Item = DVec3>) -> Self {
         let cosines = others.into_iter().map(|other| other.dot(middle));
         let half_rad = libm::acos(cosines.fold(1.0, f64::min)) + ROOM_RAD;
         Cone {
@@ -62,7 +62,7 @@ pub(crate) struct Bounds {
 
 impl Bounds {
     /// Those of a scene, from `place_m`; the lidar is at zero.
-    pub(crate) fn of(scene: &Scene, place_m: DVec3) -> Self {
+    pub(crate) fn from_scene(scene: &Scene, place_m: DVec3) -> Self {
         let disc = |(centre_m, radius_m): (DVec3, f64)| {
             let offset_m = centre_m - place_m;
             let away_m = offset_m.length();
@@ -84,14 +84,14 @@ impl Bounds {
     /// Objects that `rays` from the place may meet; none of them may look backwards from another.
     pub(crate) fn of_rays(&self, rays: &[Ray]) -> Candidates {
         let sum: DVec3 = rays.iter().map(|ray| ray.direction).sum();
-        self.about(Cone::about(
+        self.candidates(Cone::enclosing(
             sum.normalize(),
             rays.iter().map(|ray| ray.direction),
         ))
     }
 
     /// Objects that rays from the place within a cone may meet.
-    pub(super) fn about(&self, cone: Cone) -> Candidates {
+    pub(super) fn candidates(&self, cone: Cone) -> Candidates {
         let (sine, cosine) = cone.sine_cosine;
         let may_meet = |disc: &Option<Disc>| {
             disc.is_none_or(|disc| {
@@ -171,8 +171,8 @@ mod tests {
             let mut scene = Scene::outdoor();
             scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
             let rays: Vec<Ray> = spread.iter().map(|beside| Ray::new(place_m, towards + *beside)).collect();
-            let candidates = Bounds::of(&scene, place_m).of_rays(&rays);
-            let stage = Stage::of(&scene);
+            let candidates = Bounds::from_scene(&scene, place_m).of_rays(&rays);
+            let stage = Stage::new(&scene);
             for ray in &rays {
                 prop_assert_eq!(scene.hit(ray), stage.hit_of(ray, &candidates));
             }
@@ -187,7 +187,7 @@ mod tests {
         ) {
             let mut scene = Scene::outdoor();
             scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
-            let stage = Stage::of(&scene);
+            let stage = Stage::new(&scene);
             for origin in from_m {
                 let ray = Ray::new(origin, towards);
                 let blocked = scene.objects.iter().any(|object| object.shape.intersect(&ray).is_some());
@@ -211,16 +211,16 @@ mod tests {
                     object
                 })
                 .collect();
-            let (stage, bounds) = (Stage::of(&scene), Bounds::of(&scene, DVec3::ZERO));
+            let (stage, bounds) = (Stage::new(&scene), Bounds::from_scene(&scene, DVec3::ZERO));
             let camera = scene.lidar_camera(6, 5);
             for (row, col) in (0..6).flat_map(|row| (0..5).map(move |col| (row, col))) {
-                let at = |du: f64, dv: f64| {
+                let ray_direction = |du: f64, dv: f64| {
                     camera.at_unit_depth((f64::from(col) + du, f64::from(row) + dv)).normalize()
                 };
-                let middle = at(0.5, 0.5);
-                let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
-                let candidates = bounds.about(Cone::about(middle, corners));
-                for direction in corners.into_iter().chain([middle, at(0.2, 0.9)]) {
+                let middle = ray_direction(0.5, 0.5);
+                let corners = [ray_direction(0.0, 0.0), ray_direction(0.0, 1.0), ray_direction(1.0, 0.0), ray_direction(1.0, 1.0)];
+                let candidates = bounds.candidates(Cone::enclosing(middle, corners));
+                for direction in corners.into_iter().chain([middle, ray_direction(0.2, 0.9)]) {
                     let ray = Ray::new(DVec3::ZERO, direction);
                     prop_assert_eq!(scene.returns(&ray), stage.returns_of(&ray, &candidates));
                 }
@@ -233,7 +233,7 @@ mod tests {
         let scene = Scene::outdoor();
         let truth = GroundTruth::render(&scene, 64, 64);
         let camera = scene.lidar_camera(64, 64);
-        let bounds = Bounds::of(&scene, DVec3::ZERO);
+        let bounds = Bounds::from_scene(&scene, DVec3::ZERO);
         let mut tried = 0;
         for pixel in 0..64 * 64u32 {
             let (row, col) = (f64::from(pixel / 64), f64::from(pixel % 64));
@@ -241,7 +241,7 @@ mod tests {
             let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)];
             let corners =
                 corners.map(|(u, v)| camera.at_unit_depth((col + u, row + v)).normalize());
-            let candidates = bounds.about(Cone::about(middle, corners));
+            let candidates = bounds.candidates(Cone::enclosing(middle, corners));
             let seen = truth.surfaces[pixel as usize].iter();
             for surface in seen {
                 assert!(candidates.contains(&(surface.object as u32)));

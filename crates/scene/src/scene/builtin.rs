@@ -86,8 +86,8 @@ mod tests {
     }
 
     /// Macropixels of HSLIDAR's array that see an object at a time, and how far it is.
-    fn seen(scene: &str, object: &str, time_s: f64) -> (usize, f64) {
-        let scene = Scene::named(scene).unwrap().at(time_s);
+    fn pixels_and_range(scene: &str, object: &str, time_s: f64) -> (usize, f64) {
+        let scene = Scene::named(scene).unwrap().snapshot(time_s);
         let truth = GroundTruth::render(&scene, 32, 64);
         let is_it = |index: &Option<usize>| index.is_some_and(|i| scene.objects[i].name == object);
         let ranges = truth.object.iter().zip(&truth.range_m);
@@ -111,10 +111,10 @@ mod tests {
             ("sweep", "target", 0.0, 20.0),
             ("night", "pedestrian", 1.0, 29.8),
         ] {
-            let (pixels, least_m) = seen(scene, object, time_s);
+            let (pixels, least_m) = pixels_and_range(scene, object, time_s);
             assert!(pixels >= 9, "{object}: {pixels} macropixels");
             assert!((least_m - range_m).abs() < 0.3, "{object}: {least_m} m");
         }
-        assert_eq!(seen("empty", "", 0.0).0, 0);
+        assert_eq!(pixels_and_range("empty", "", 0.0).0, 0);
     }
 }

@@ -35,7 +35,7 @@ pub(super) struct Bundle {
 
 impl Bundle {
     /// Where a look begins.
-    pub(super) fn of(look: DVec3) -> Self {
+    pub(super) fn new(look: DVec3) -> Self {
         let (right, down) = look.any_orthonormal_pair();
         let beside = [right, down].map(|turn| Beside {
             turn,
@@ -46,7 +46,7 @@ impl Bundle {
     }
 
     /// The same `way_m` farther on.
-    pub(super) fn after(self, way_m: f64) -> Self {
+    pub(super) fn advanced(self, way_m: f64) -> Self {
         let beside = self.beside.map(|ray| Beside {
             moved_m: ray.moved_m + ray.turned * way_m,
             ..ray
@@ -76,8 +76,13 @@ impl Bundle {
     }
 
     /// The normal of a surface where the bundle ends, `range_m` from its beginning, as its beginning sees it
-    /// ([`Return::facing`](super::Return::facing)), and how much of the light is left that would be there at this range without a mirror's curvature.
-    pub(super) fn onto(&self, direction: DVec3, normal: DVec3, range_m: f64) -> (DVec3, f64) {
+    /// ([`SurfaceReturn::facing`](super::SurfaceReturn::facing)), and how much of the light is left that would be there at this range without a mirror's curvature.
+    pub(super) fn facing_and_share(
+        &self,
+        direction: DVec3,
+        normal: DVec3,
+        range_m: f64,
+    ) -> (DVec3, f64) {
         let across = self.beside.map(|ray| ray.turn * ray.moved_m.dot(normal));
         let facing = self.look * direction.dot(normal) + (across[0] + across[1]) / range_m;
         // Light of a solid angle is on this area; by the same ratio less of what the surface sends finds back to the lens.

@@ -61,7 +61,7 @@ impl PinholeCamera {
     }
 
     /// The direction, of length 1, that the centre of the pixel in a row and column sees.
-    pub fn towards(&self, (row, col): (usize, usize)) -> DVec3 {
+    pub fn direction(&self, (row, col): (usize, usize)) -> DVec3 {
         let middle = (col as f64 + 0.5, row as f64 + 0.5);
         self.at_unit_depth(middle).normalize()
     }

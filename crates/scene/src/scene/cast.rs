@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::bounds::Candidates;
 use super::bundle::{Bundle, reflected};
 use super::settings::Scene;
-use super::shape::{Meeting, Placed, Shape};
+use super::shape::{Meeting, PlacedShape, Shape};
 use super::vector::Ray;
 
 #[cfg(test)]
@@ -33,7 +33,7 @@ pub struct Hit {
 
 /// A surface that sends light back along a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Return {
+pub(crate) struct SurfaceReturn {
     /// The surface; its range is the whole way to it, its normal is turned against the light that meets it.
     pub hit: Hit,
     /// Where the ray meets it, m: over a mirror not on the ray's own line.
@@ -62,9 +62,9 @@ pub(crate) struct End {
 
 /// All that sends light back along a ray, nearest first.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Returns {
+pub(crate) struct SurfaceReturns {
     /// Surfaces; none where there is only sky.
-    pub surfaces: SmallVec<[Return; 2]>,
+    pub surfaces: SmallVec<[SurfaceReturn; 2]>,
     /// Where light ends; each of its shares is 1 in all.
     pub ends: SmallVec<[End; 2]>,
     /// Share of the sky's light that arrives, 0 to 1.
@@ -82,7 +82,7 @@ impl Scene {
     /// The nearest opaque surface along `ray`, as if panes were not there; `None` for the sky. Of two in the same place
     /// the one listed first in the scene counts.
     pub fn hit(&self, ray: &Ray) -> Option<Hit> {
-        Stage::of(self).hit(ray)
+        Stage::new(self).hit(ray)
     }
 
     /// All that sends light back along `ray`: panes themselves, what stands behind them, and what they mirror.
@@ -90,8 +90,8 @@ impl Scene {
     /// Light goes there and back the same way, so what is left of it is a share of a share: a plane mirror shows what stands before
     /// it as far behind it. A pane's thickness, and light that goes one way over a mirror and the other past it, are left out.
     #[cfg(test)]
-    pub(crate) fn returns(&self, ray: &Ray) -> Returns {
-        let stage = Stage::of(self);
+    pub(crate) fn returns(&self, ray: &Ray) -> SurfaceReturns {
+        let stage = Stage::new(self);
         stage.followed(ray, stage.first_meeting(ray, stage.all()), None)
     }
 }
@@ -101,7 +101,7 @@ impl Scene {
 pub struct Stage<'a> {
     /// What was made ready.
     pub(crate) scene: &'a Scene,
-    placed: Vec<Placed<'a>>,
+    placed: Vec<PlacedShape<'a>>,
     /// Balls around the objects, for rays that do not come from one place.
     balls: Vec<Option<(DVec3, f64)>>,
     /// Towards the sun.
@@ -112,7 +112,7 @@ pub struct Stage<'a> {
 
 /// How far light has come along a ray.
 #[derive(Debug, Clone, Copy)]
-struct Way {
+struct RayProgress {
     so_far_m: f64,
     /// Share of it that arrives one way.
     share: f64,
@@ -121,9 +121,9 @@ struct Way {
     bundle: Option<Bundle>,
 }
 
-impl Default for Way {
+impl Default for RayProgress {
     fn default() -> Self {
-        Way {
+        RayProgress {
             so_far_m: 0.0,
             share: 1.0,
             mirrors: 0,
@@ -136,7 +136,7 @@ impl Default for Way {
 pub(super) type First = Option<(Meeting, usize)>;
 
 impl<'a> Stage<'a> {
-    pub fn of(scene: &'a Scene) -> Self {
+    pub fn new(scene: &'a Scene) -> Self {
         let shapes = || scene.objects.iter().map(|object| &object.shape);
         let retro = scene.objects.iter().map(|object| object.retro);
         Stage {
@@ -170,17 +170,22 @@ impl<'a> Stage<'a> {
         let mut opaque = self.opaque(self.all());
         opaque.any(|n| {
             self.balls[n].is_none_or(|ball| may_be_met(ball, ray))
-                && self.placed[n].meet(ray).is_some()
+                && self.placed[n].intersect(ray).is_some()
         })
     }
 
     /// As [`Scene::returns`], where the ray meets no others than the `candidates`.
-    pub(crate) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> Returns {
+    pub(crate) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> SurfaceReturns {
         self.returns_from(ray, self.meeting_of(ray, candidates), candidates)
     }
 
     /// The same for a ray that first meets what [`Stage::meeting_of`] says.
-    pub(super) fn returns_from(&self, ray: &Ray, first: First, candidates: &Candidates) -> Returns {
+    pub(super) fn returns_from(
+        &self,
+        ray: &Ray,
+        first: First,
+        candidates: &Candidates,
+    ) -> SurfaceReturns {
         self.followed(ray, first, Some(candidates))
     }
 
@@ -189,14 +194,15 @@ impl<'a> Stage<'a> {
         first.is_none_or(|(_, object)| self.scene.objects[object].ends_rays())
     }
 
-    fn followed(&self, ray: &Ray, first: First, candidates: Option<&Candidates>) -> Returns {
-        let mut returns = Returns {
+    fn followed(&self, ray: &Ray, first: First, candidates: Option<&Candidates>) -> SurfaceReturns {
+        let mut returns = SurfaceReturns {
             surfaces: SmallVec::new(),
             ends: SmallVec::new(),
             sky_share: 0.0,
         };
-        self.follow(ray, first, candidates, Way::default(), &mut returns);
-        let by_range = |a: &Return, b: &Return| a.hit.range_m.total_cmp(&b.hit.range_m);
+        self.follow(ray, first, candidates, RayProgress::default(), &mut returns);
+        let by_range =
+            |a: &SurfaceReturn, b: &SurfaceReturn| a.hit.range_m.total_cmp(&b.hit.range_m);
         returns.surfaces.sort_by(by_range);
         returns
     }
@@ -208,10 +214,10 @@ impl<'a> Stage<'a> {
         ray: &Ray,
         first: First,
         candidates: Option<&Candidates>,
-        way: Way,
-        returns: &mut Returns,
+        way: RayProgress,
+        returns: &mut SurfaceReturns,
     ) {
-        let Way {
+        let RayProgress {
             so_far_m, share, ..
         } = way;
         let Some((meeting, index)) = first else {
@@ -225,15 +231,15 @@ impl<'a> Stage<'a> {
         };
         let mut hit = self.seen_at(ray, (meeting, index));
         let object = &self.scene.objects[index];
-        let point = ray.at(hit.range_m);
-        let bundle = way.bundle.map(|bundle| bundle.after(hit.range_m));
+        let point = ray.point(hit.range_m);
+        let bundle = way.bundle.map(|bundle| bundle.advanced(hit.range_m));
         hit.range_m += so_far_m;
         if hit.reflectivity > 0.0 || hit.grey > 0.0 || object.ends_rays() {
             let (facing, kept) = match &bundle {
                 None => (hit.normal, 1.0),
-                Some(bundle) => bundle.onto(ray.direction, hit.normal, hit.range_m),
+                Some(bundle) => bundle.facing_and_share(ray.direction, hit.normal, hit.range_m),
             };
-            returns.surfaces.push(Return {
+            returns.surfaces.push(SurfaceReturn {
                 hit,
                 place_m: point,
                 facing,
@@ -261,7 +267,7 @@ impl<'a> Stage<'a> {
                 Some(candidates) => self.meeting_of(&beyond, candidates),
                 None => self.first_meeting(&beyond, self.all()),
             };
-            let onwards = Way {
+            let onwards = RayProgress {
                 so_far_m,
                 share,
                 bundle,
@@ -271,11 +277,11 @@ impl<'a> Stage<'a> {
         }
         if let Some(share) = thrown {
             let reflected = Ray::new(point, reflected(ray.direction, hit.normal));
-            let bundle = bundle.unwrap_or_else(|| Bundle::of(ray.direction).after(so_far_m));
+            let bundle = bundle.unwrap_or_else(|| Bundle::new(ray.direction).advanced(so_far_m));
             let placed = &self.placed[index];
             let outward = placed.normal_at(point, meeting.part);
             let bend = |step_m| placed.bend(meeting.part, step_m);
-            let back = Way {
+            let back = RayProgress {
                 so_far_m,
                 share,
                 mirrors: way.mirrors + 1,
@@ -305,7 +311,7 @@ impl<'a> Stage<'a> {
     fn first_meeting(&self, ray: &Ray, objects: impl Iterator<Item = usize>) -> First {
         let mut nearest: First = None;
         for index in objects {
-            if let Some(meeting) = self.placed[index].meet(ray)
+            if let Some(meeting) = self.placed[index].intersect(ray)
                 && nearest.is_none_or(|(least, _)| meeting.range_m < least.range_m)
             {
                 nearest = Some((meeting, index));
@@ -318,7 +324,7 @@ impl<'a> Stage<'a> {
     pub(super) fn seen_at(&self, ray: &Ray, (meeting, index): (Meeting, usize)) -> Hit {
         let Meeting { range_m, part } = meeting;
         let (object, placed) = (&self.scene.objects[index], &self.placed[index]);
-        let point = ray.at(range_m);
+        let point = ray.point(range_m);
         let normal = placed.normal_at(point, part);
         let (reflectivity, grey) = object.material_at(placed, point, part);
         Hit {

@@ -88,7 +88,7 @@ impl Curve {
     }
 
     /// Its value at `x`; beyond its ends `None`.
-    pub(crate) fn at(&self, x: f64) -> Option<f64> {
+    pub(crate) fn interpolate(&self, x: f64) -> Option<f64> {
         let (first, last) = self.ends();
         if !(first..=last).contains(&x) {
             return None;
@@ -117,7 +117,7 @@ impl Curve {
             let columns: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
             let values: Vec<f64> = columns.iter().filter_map(|c| c.parse().ok()).collect();
             let is_header = std::mem::take(&mut may_be_header) && values.is_empty();
-            let complain = |message| Err(InputError::at(&source, number, message));
+            let complain = |message| Err(InputError::at_line(&source, number, message));
             match (columns.len(), <[f64; 2]>::try_from(&values[..])) {
                 (2, Ok(_)) if points.len() == MOST_POINTS => {
                     return complain(format!(
@@ -154,40 +154,40 @@ impl From<Curve> for Vec<[f64; 2]> {
 /// One of some words, or a measured curve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Measured<Word> {
+pub enum CurveSetting<Word> {
     /// What needs no measurement.
     Word(Word),
     /// A curve.
     Curve(Curve),
 }
 
-impl<Word> Measured<Word> {
+impl<Word> CurveSetting<Word> {
     /// The curve, if it is one.
     pub(crate) fn curve(&self) -> Option<&Curve> {
         match self {
-            Measured::Word(_) => None,
-            Measured::Curve(curve) => Some(curve),
+            CurveSetting::Word(_) => None,
+            CurveSetting::Curve(curve) => Some(curve),
         }
     }
 }
 
-impl<Word: Default> Default for Measured<Word> {
+impl<Word: Default> Default for CurveSetting<Word> {
     fn default() -> Self {
-        Measured::Word(Word::default())
+        CurveSetting::Word(Word::default())
     }
 }
 
-impl<'de, Word: DeserializeOwned> Deserialize<'de> for Measured<Word> {
+impl<'de, Word: DeserializeOwned> Deserialize<'de> for CurveSetting<Word> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let said = |e: toml::de::Error| D::Error::custom(e.message().trim());
         match Value::deserialize(deserializer)? {
             Value::String(word) => {
                 let word = Word::deserialize(Value::String(word)).map_err(said)?;
-                Ok(Measured::Word(word))
+                Ok(CurveSetting::Word(word))
             }
             Value::Array(pairs) => {
                 let curve = Curve::deserialize(Value::Array(pairs)).map_err(said)?;
-                Ok(Measured::Curve(curve))
+                Ok(CurveSetting::Curve(curve))
             }
             other => {
                 let message = format!("{other} is neither a word nor a list of pairs of numbers");
@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn curves_are_linear_between_their_points_and_nothing_beyond() {
         let curve = Curve::new(&[[1.0, 0.0], [2.0, 1.0], [4.0, 0.5]]).unwrap();
-        let at = [0.9, 1.0, 1.25, 2.0, 3.0, 4.0, 4.1].map(|x| curve.at(x));
+        let at = [0.9, 1.0, 1.25, 2.0, 3.0, 4.0, 4.1].map(|x| curve.interpolate(x));
         let expected = [
             None,
             Some(0.0),

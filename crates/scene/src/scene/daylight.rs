@@ -66,16 +66,17 @@ mod tests {
         assert!((sun - DVec3::new(0.5f64.sqrt(), -(0.5f64.sqrt()), 0.0)).length() < 1e-12);
         let far = DVec3::new(50.0, 0.0, 10.0);
         let ground = 0.8 * 0.5f64.sqrt() + 0.2;
-        assert!((Stage::of(&scene).daylight(far, DVec3::NEG_Y) - ground).abs() < 1e-12);
-        assert!((Stage::of(&scene).daylight(far, DVec3::NEG_X) - 0.1).abs() < 1e-12);
+        assert!((Stage::new(&scene).daylight(far, DVec3::NEG_Y) - ground).abs() < 1e-12);
+        assert!((Stage::new(&scene).daylight(far, DVec3::NEG_X) - 0.1).abs() < 1e-12);
         let facing = 0.8 + 0.2 * (1.0 + 0.5f64.sqrt()) / 2.0;
-        assert!((Stage::of(&scene).daylight(far, sun) - facing).abs() < 1e-12);
+        assert!((Stage::new(&scene).daylight(far, sun) - facing).abs() < 1e-12);
     }
 
     #[test]
     fn a_pole_throws_its_shadow_away_from_the_sun() {
         let scene = scene();
-        let on_ground = |x: f64| Stage::of(&scene).daylight(DVec3::new(x, 2.0, 10.0), DVec3::NEG_Y);
+        let on_ground =
+            |x: f64| Stage::new(&scene).daylight(DVec3::new(x, 2.0, 10.0), DVec3::NEG_Y);
         assert!((on_ground(-1.0) - 0.2).abs() < 1e-12);
         assert!(on_ground(1.0) > 0.7 && on_ground(-2.5) > 0.7);
     }
@@ -85,7 +86,7 @@ mod tests {
         let mut scene = scene();
         scene.light.sun_elevation_deg = None;
         assert_eq!(
-            Stage::of(&scene).daylight(DVec3::new(-1.0, 2.0, 10.0), DVec3::X),
+            Stage::new(&scene).daylight(DVec3::new(-1.0, 2.0, 10.0), DVec3::X),
             1.0
         );
     }

@@ -22,7 +22,7 @@ const TEXTURE_M: f64 = 0.5;
 
 words! {
     /// Kinds of object in a file.
-    pub(super) enum Kind {
+    pub(super) enum ObjectKind {
         Ground = "ground",
         Plane = "plane",
         Box = "box",
@@ -64,7 +64,7 @@ macro_rules! entry {
                 /// Name in messages and for --set.
                 name: String = String::new(), from "-";
                 /// Shape.
-                kind: Kind = Kind::Ground, from "-";
+                kind: ObjectKind = ObjectKind::Ground, from "-";
                 /// Lambertian reflectivity at the laser's wavelength.
                 reflectivity: f64 = 0.0, in SHARE, from "-";
                 $(
@@ -180,18 +180,18 @@ macro_rules! plain_shapes {
         impl ObjectEntry {
             fn plain_shape(&self) -> Result<Option<Shape>, String> {
                 Ok(Some(match self.kind {
-                    $(Kind::$kind => {
+                    $(ObjectKind::$kind => {
                         self.refuse_others(&[$(stringify!($key)),+])?;
                         Shape::$kind { $($key: plain_shapes!(@read self $key $($usual)?)),+ }
                     })+
-                    Kind::Mesh | Kind::Map => return Ok(None),
+                    ObjectKind::Mesh | ObjectKind::Map => return Ok(None),
                 }))
             }
 
             fn write_plain_shape(&mut self, shape: Shape) {
                 match shape {
                     $(Shape::$kind { $($key),+ } => {
-                        self.kind = Kind::$kind;
+                        self.kind = ObjectKind::$kind;
                         $(self.$key = Some($key);)+
                     })+
                     Shape::Mesh { .. } | Shape::Map { .. } => {}
@@ -256,7 +256,7 @@ impl ObjectEntry {
             return Ok(plain);
         }
         Ok(match self.kind {
-            Kind::Mesh => {
+            ObjectKind::Mesh => {
                 self.refuse_others(&["file", "centre_m", "scale_m", "yaw_deg"])?;
                 let file = placed(folder, self.need("file", self.file.as_ref())?);
                 Shape::Mesh {
@@ -268,11 +268,11 @@ impl ObjectEntry {
             }
             _ => {
                 self.refuse_others(OF_MAPS)?;
-                let at = |file: &PathBuf| placed(folder, file);
+                let path = |file: &PathBuf| placed(folder, file);
                 let files = MapFiles {
-                    depth: at(self.need("depth_file", self.depth_file.as_ref())?),
-                    reflectivity: self.reflectivity_file.as_ref().map(at),
-                    grey: self.grey_file.as_ref().map(at),
+                    depth: path(self.need("depth_file", self.depth_file.as_ref())?),
+                    reflectivity: self.reflectivity_file.as_ref().map(path),
+                    grey: self.grey_file.as_ref().map(path),
                     unit_m: self.depth_unit_m,
                     is_range: matches!(self.depth_along, Some(DepthKind::Range)),
                     focal_px: self.need("focal_px", self.focal_px)?,
@@ -377,7 +377,7 @@ impl ObjectEntry {
                 yaw_deg,
                 mesh,
             } => {
-                self.kind = Kind::Mesh;
+                self.kind = ObjectKind::Mesh;
                 self.centre_m = Some(centre_m);
                 self.scale_m = Some(scale_m);
                 self.yaw_deg = Some(yaw_deg);
@@ -389,7 +389,7 @@ impl ObjectEntry {
                 map,
             } => {
                 let files = map.files.clone();
-                self.kind = Kind::Map;
+                self.kind = ObjectKind::Map;
                 self.centre_m = Some(centre_m);
                 self.yaw_deg = Some(yaw_deg);
                 self.depth_file = Some(files.depth);

@@ -21,7 +21,7 @@ use serde::Serialize;
 
 use super::settings::Scene;
 use super::words::BeamWord;
-use super::{Measured, PinholeCamera};
+use super::{CurveSetting, PinholeCamera};
 
 /// Time over which an unintended look is averaged, s.
 const TIME_BASE_S: f64 = 100.0;
@@ -116,30 +116,30 @@ pub struct EyeSafety {
 
 impl Train {
     /// Most pulses within `time_s`; one that comes at its end counts, whatever rounding makes of that.
-    fn within(&self, time_s: f64) -> f64 {
+    fn most_pulses(&self, time_s: f64) -> f64 {
         let frames = (time_s / self.frame_s + 1e-9).floor();
         let rest_s = time_s - frames * self.frame_s;
         let of_rest = (rest_s * self.rate_hz + 1e-6).floor() + 1.0;
         frames * self.pulses + of_rest.min(self.pulses)
     }
 
-    /// Times about `time_s` at which [`Train::within`] grows, s: the last one up to it, the next one, and the ends of this exposure and of the next.
-    fn around(&self, time_s: f64) -> [f64; 4] {
+    /// Times about `time_s` at which [`Train::most_pulses`] grows, s: the last one up to it, the next one, and the ends of this exposure and of the next.
+    fn times_around(&self, time_s: f64) -> [f64; 4] {
         let begin_s = (time_s / self.frame_s).floor() * self.frame_s;
         let last = (self.pulses - 1.0).min(((time_s - begin_s) * self.rate_hz).floor());
-        let at = |number: f64| begin_s + number / self.rate_hz;
-        let end_s = at(self.pulses - 1.0);
+        let pulse_s = |number: f64| begin_s + number / self.rate_hz;
+        let end_s = pulse_s(self.pulses - 1.0);
         let next_s = if last + 1.0 < self.pulses {
-            at(last + 1.0)
+            pulse_s(last + 1.0)
         } else {
             begin_s + self.frame_s
         };
-        [at(last), next_s, end_s, end_s + self.frame_s]
+        [pulse_s(last), next_s, end_s, end_s + self.frame_s]
     }
 }
 
 impl Band {
-    fn of(wavelength_nm: f64) -> Option<Self> {
+    fn from_wavelength(wavelength_nm: f64) -> Option<Self> {
         match wavelength_nm {
             700.0..1050.0 => Some(Band::NearInfrared),
             1050.0..=1200.0 => Some(Band::Retina1050),
@@ -195,7 +195,7 @@ impl Emission {
 
     /// The same laser with `times` the energy in a pulse, and with other times.
     #[must_use]
-    pub fn with(self, times: f64, train: Train) -> Self {
+    pub fn scaled(self, times: f64, train: Train) -> Self {
         Emission {
             pulse_j: times * self.pulse_j,
             train,
@@ -205,10 +205,10 @@ impl Emission {
 
     /// The limit that is nearest; `None` at wavelengths that are not judged.
     pub fn beside_class_1(&self) -> Option<EyeSafety> {
-        let band = Band::of(self.wavelength_nm)?;
+        let band = Band::from_wavelength(self.wavelength_nm)?;
         let train = &self.train;
         let judged = |rule, within_s: f64, share: f64| {
-            let pulses = train.within(within_s);
+            let pulses = train.most_pulses(within_s);
             let into_eye_j = pulses * self.accessible_j(band, within_s);
             (
                 rule,
@@ -221,11 +221,12 @@ impl Emission {
         let mut all = vec![judged(EyeRule::SinglePulse, one_s, 1.0)];
         if band != Band::Cornea1500 {
             let look_s = self.t2_s.min(TIME_BASE_S);
-            let in_train = train.within(look_s) / train.within(one_s);
+            let in_train = train.most_pulses(look_s) / train.most_pulses(one_s);
             all.push(judged(EyeRule::PulseTrain, one_s, c5(in_train)));
             // C5 is for pulses of a quarter of a second at most.
             if exposure_s > one_s && exposure_s <= 0.25 {
-                let share = self.c5_of_exposures(exposure_s, train.within(look_s) / train.pulses);
+                let share =
+                    self.c5_of_exposures(exposure_s, train.most_pulses(look_s) / train.pulses);
                 all.push(judged(EyeRule::Exposure, exposure_s, share));
             }
         }
@@ -233,7 +234,7 @@ impl Emission {
         let turns_s = [one_s, exposure_s, self.t2_s, TIME_BASE_S];
         let has_turns = band == Band::Cornea1500 || self.source_mrad > widest_mrad(0.0);
         let more_s = TURNS_S.iter().filter(|_| has_turns);
-        let times_s = (turns_s.iter().chain(more_s)).flat_map(|&turn_s| train.around(turn_s));
+        let times_s = (turns_s.iter().chain(more_s)).flat_map(|&turn_s| train.times_around(turn_s));
         let times_s = times_s.chain([TIME_BASE_S]);
         let times_s = times_s.filter(|time_s| (one_s..=TIME_BASE_S).contains(time_s));
         all.extend(times_s.map(|time_s| judged(EyeRule::Average, time_s, 1.0)));
@@ -341,7 +342,7 @@ impl Scene {
         if let Some(curve) = beam.curve() {
             return curve.greatest() / self.lidar.beam_total();
         }
-        if *beam == Measured::Word(BeamWord::Gaussian) {
+        if *beam == CurveSetting::Word(BeamWord::Gaussian) {
             return 1.0 / self.lidar.beam_total();
         }
         // All macropixels get the same, and one in a corner sees the smallest solid angle.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::curve::{Measured, read_file};
+use super::curve::{CurveSetting, read_file};
 use super::entry::ObjectEntry;
 use super::interferer::Interferer;
 use super::medium::Medium;
@@ -251,7 +251,7 @@ fn interferer(
 
 /// What other lidars' wavelengths ask of the filter.
 fn check_wavelengths(scene: &Scene) -> Option<Fault> {
-    if scene.lidar.filter != Measured::Word(FilterWord::Irradiance) {
+    if scene.lidar.filter != CurveSetting::Word(FilterWord::Irradiance) {
         return None;
     }
     let index = scene

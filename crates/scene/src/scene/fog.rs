@@ -39,7 +39,7 @@ pub(super) type Ends = [(f64, f64)];
 
 impl Fog {
     /// Of the scene's medium; `None` if it sends nothing back.
-    pub(super) fn of(scene: &Scene, budget: &PhotonBudget) -> Option<Self> {
+    pub(super) fn from_scene(scene: &Scene, budget: &PhotonBudget) -> Option<Self> {
         let medium = &scene.medium;
         if medium.backscatter_1_m_sr() <= 0.0 {
             return None;
@@ -61,7 +61,7 @@ impl Fog {
 
     /// Adds it to the light of a macropixel whose rays end there. `centre_fs` is when the centre of the laser pulse comes in its own
     /// time, `sigma` the standard deviation of its Gaussian part, `gain` what the macropixel gets relative to one on the axis.
-    pub(super) fn onto(
+    pub(super) fn add_to(
         &self,
         mut light: PixelLight,
         ends: &Ends,
@@ -130,7 +130,7 @@ mod tests {
         let lights = |scene: &Scene| scene.pixel_light(&truth(scene));
         let [of_clear, of_fog] = [&clear, &foggy].map(lights);
         let budget = foggy.photon_budget(16, 16);
-        let glare = Fog::of(&foggy, &budget).unwrap();
+        let glare = Fog::from_scene(&foggy, &budget).unwrap();
         let truth = truth(&foggy);
         for pixel in 0..256 {
             let echoes = |light: &PixelLight| -> Vec<Echo> {
@@ -177,10 +177,10 @@ mod tests {
     fn early_light_follows_the_law_of_fog() {
         let scene = foggy();
         let budget = scene.photon_budget(64, 64);
-        let fog = Fog::of(&scene, &budget).unwrap();
+        let fog = Fog::from_scene(&scene, &budget).unwrap();
         let sigma = scene.pulse_sigma();
         let dim = PixelLight::background(1e6);
-        let light = fog.onto(dim, &[(60.0, 1.0)], 1.0, sigma, 0.0);
+        let light = fog.add_to(dim, &[(60.0, 1.0)], 1.0, sigma, 0.0);
         let segment = light.segments().next().unwrap();
         let profile = segment.profile.as_ref().unwrap();
         let below = |z: f64| 0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2);

@@ -11,7 +11,7 @@
 //! An excess bias V makes an avalanche of a carrier with the probability 1 − exp(−V/V₀): Otte et al., arXiv:1606.05186, who operate at
 //! 90 % of what can be had. That and all keys hold at 25 °C, where every factor here is exactly 1.
 
-use super::curve::Measured;
+use super::curve::CurveSetting;
 use super::settings::{Lidar, REFERENCE_C};
 use crate::numerics::integrate;
 use crate::photon::{Filter, FilterShape};
@@ -60,10 +60,10 @@ impl Lidar {
     /// Detection efficiency at its temperature and its laser's wavelength, 0 to 1.
     pub fn warm_pde(&self) -> f64 {
         let of_wavelength = match &self.pde_curve {
-            Measured::Word(_) => 1.0,
-            Measured::Curve(curve) => {
-                let at = |nm| curve.at(nm).unwrap_or(0.0);
-                at(self.warm_wavelength_nm()) / at(self.wavelength_nm)
+            CurveSetting::Word(_) => 1.0,
+            CurveSetting::Curve(curve) => {
+                let pde = |nm| curve.interpolate(nm).unwrap_or(0.0);
+                pde(self.warm_wavelength_nm()) / pde(self.wavelength_nm)
             }
         };
         (self.pde * self.triggering() * of_wavelength).min(1.0)
@@ -92,7 +92,7 @@ impl Lidar {
             return self.filter_at(nm).unwrap_or(1.0);
         }
         let breaks = match &self.filter {
-            Measured::Word(word) => match word.shape() {
+            CurveSetting::Word(word) => match word.shape() {
                 None => return 1.0,
                 Some(shape) => {
                     let filter = self.filter_of(shape);
@@ -103,13 +103,13 @@ impl Lidar {
                     (-2..=2).map(edge).collect()
                 }
             },
-            Measured::Curve(curve) => {
+            CurveSetting::Curve(curve) => {
                 let points = curve.points.iter();
                 points.map(|[at, _]| at + self.filter_shift_nm()).collect()
             }
         };
         let line = Filter::new(nm, fwhm_nm, FilterShape::Gaussian);
-        self.through(breaks, line)
+        self.passed_share(breaks, line)
     }
 
     /// Detected photons of a joule of light at `nm`, relative to those of the laser's own light: by the filter, the detection efficiency
@@ -120,7 +120,7 @@ impl Lidar {
     }
 
     /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
-    fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
+    fn passed_share(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
         breaks.extend((-12..=12).map(|k| line.centre_nm + f64::from(k) * 0.25 * line.fwhm_nm));
         let reach_nm = 3.0 * line.fwhm_nm;
         breaks.retain(|nm| (nm - line.centre_nm).abs() <= reach_nm);
@@ -140,14 +140,14 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, Train};
 
-    fn at(celsius: f64) -> Lidar {
+    fn lidar_at(celsius: f64) -> Lidar {
         let keys = format!("[lidar]\ntemperature_c = {celsius}\ndark_count_hz = 2e4\n");
         Scene::parse("test", &keys).unwrap().lidar
     }
 
     #[test]
     fn nothing_changes_at_25_degrees() {
-        let (given, lidar) = (Lidar::default(), at(25.0));
+        let (given, lidar) = (Lidar::default(), lidar_at(25.0));
         assert_eq!(lidar.dark_counts_hz(), 2e4);
         assert_eq!(lidar.warm_pde(), given.pde);
         assert_eq!(lidar.warm_wavelength_nm(), given.wavelength_nm);
@@ -159,7 +159,7 @@ mod tests {
         let near = |value: f64, expected: f64| {
             assert!((value / expected - 1.0).abs() < 1e-9, "{value} {expected}");
         };
-        let hot = at(105.0);
+        let hot = lidar_at(105.0);
         // 80 K take 1.72 V of 3 V, of which 1 V loses a factor of 10^(1/3).
         let triggered = (1.0 - 10f64.powf(-(3.0 - 1.72) / 3.0)) / 0.9;
         near(hot.warm_pde(), 0.185 * triggered);
@@ -171,7 +171,7 @@ mod tests {
         // Generation doubles every 9.8 K.
         let steady = |celsius| Lidar {
             breakdown_drift_mv_k: 0.0,
-            ..at(celsius)
+            ..lidar_at(celsius)
         };
         let doubled = steady(34.8).dark_counts_hz() / steady(25.0).dark_counts_hz();
         assert!((doubled - 2.0).abs() < 0.02, "{doubled}");
@@ -179,7 +179,10 @@ mod tests {
 
     #[test]
     fn the_warmer_the_more_dark_counts_and_the_fewer_photons() {
-        let all: Vec<Lidar> = (-55..=125).step_by(5).map(|c| at(f64::from(c))).collect();
+        let all: Vec<Lidar> = (-55..=125)
+            .step_by(5)
+            .map(|c| lidar_at(f64::from(c)))
+            .collect();
         for pair in all.windows(2) {
             assert!(pair[1].dark_counts_hz() > pair[0].dark_counts_hz());
             assert!(pair[1].warm_pde() < pair[0].warm_pde());
@@ -187,7 +190,7 @@ mod tests {
         // Without any bias left there are neither.
         let dead = Lidar {
             breakdown_drift_mv_k: 1000.0,
-            ..at(60.0)
+            ..lidar_at(60.0)
         };
         assert_eq!((dead.dark_counts_hz(), dead.warm_pde()), (0.0, 0.0));
     }

@@ -9,7 +9,7 @@ use super::fog::Fog;
 use super::optics::OffAxis;
 use super::settings::Scene;
 use super::stray_light::with_stray_light;
-use super::truth::{Before, GroundTruth};
+use super::truth::{GroundTruth, PreviousWorld};
 use super::view::{Glimpse, View};
 use crate::photon::{
     CROSSTALK_DELAY, Echo, Glint, PhotonBudget, PixelLight, PulseTrain, SpadLayout, SpadModel,
@@ -77,8 +77,10 @@ impl Scene {
         let mut last: Option<(Scene, GroundTruth)> = None;
         for cycles in segments {
             let middle = 0.5 * (f64::from(cycles.start) + f64::from(cycles.end));
-            let world = self.at(middle * cycle_s);
-            let before = last.as_ref().map(|(world, truth)| Before { world, truth });
+            let world = self.snapshot(middle * cycle_s);
+            let before = last
+                .as_ref()
+                .map(|(world, truth)| PreviousWorld { world, truth });
             let (truth, _) = GroundTruth::render_after(&world, truth.rows, truth.cols, before);
             let light = seen.last().map(|(_, light)| light.as_slice());
             let light = world.light_on(&truth, spads, before.zip(light));
@@ -108,7 +110,7 @@ impl Scene {
         }
         let own = |(pixel, light): (usize, PixelLight)| {
             let spread = self.spad_spread(pixel as u32, layout.spads());
-            let lit = layout.lit(light, spread.as_ref());
+            let lit = layout.place_light(light, spread.as_ref());
             lit.expect("as many SPADs as the layout has")
         };
         lights.into_iter().enumerate().map(own).collect()
@@ -135,7 +137,7 @@ impl Scene {
         &self,
         truth: &GroundTruth,
         spads: &SpadModel,
-        before: Option<(Before<'_>, &[PixelLight])>,
+        before: Option<(PreviousWorld<'_>, &[PixelLight])>,
     ) -> Vec<PixelLight> {
         self.on_own_spads(self.light_on(truth, spads, before), spads)
     }
@@ -155,7 +157,7 @@ impl Scene {
         &self,
         truth: &GroundTruth,
         spads: &SpadModel,
-        before: Option<(Before<'_>, &[PixelLight])>,
+        before: Option<(PreviousWorld<'_>, &[PixelLight])>,
     ) -> Vec<PixelLight> {
         let has_crosstalk = spads.crosstalk_probability > 0.0;
         let has_stray_light = self.lidar.stray_share > 0.0;
@@ -177,14 +179,14 @@ impl Scene {
         let centre_fs = self.pulse_shape().map_or(0.0, |shape| shape.mean_fs());
         let views = truth.views.par_iter().zip(&off_axis).enumerate();
         let falling = views.map(|(pixel, (view, off_axis))| match kept(pixel) {
-            Some(light) => Lit::AsBefore(light),
-            None => Lit::Anew(self.falling(view, &budget, off_axis, centre_fs)),
+            Some(light) => PixelIllumination::AsBefore(light),
+            None => PixelIllumination::Anew(self.falling(view, &budget, off_axis, centre_fs)),
         });
-        let mut falling: Vec<Lit<'_>> = falling.collect();
+        let mut falling: Vec<PixelIllumination<'_>> = falling.collect();
         if has_crosstalk || has_stray_light {
             let all = falling.into_iter().filter_map(|lit| match lit {
-                Lit::Anew(falling) => Some(falling),
-                Lit::AsBefore(_) => None,
+                PixelIllumination::Anew(falling) => Some(falling),
+                PixelIllumination::AsBefore(_) => None,
             });
             let (mut all, cols): (Vec<_>, _) = (all.collect(), cols as usize);
             if has_stray_light {
@@ -193,14 +195,14 @@ impl Scene {
             if has_crosstalk {
                 all = with_crosstalk(&all, spads, cols);
             }
-            falling = all.into_iter().map(Lit::Anew).collect();
+            falling = all.into_iter().map(PixelIllumination::Anew).collect();
         }
         let (sigma, resolution) = (self.pulse_sigma(), self.pulse_resolution());
-        let fog = Fog::of(self, &budget);
-        let light = |(lit, (view, off_axis)): (Lit<'_>, (&Arc<View>, &OffAxis))| {
+        let fog = Fog::from_scene(self, &budget);
+        let light = |(lit, (view, off_axis)): (PixelIllumination<'_>, (&Arc<View>, &OffAxis))| {
             let mut falling = match lit {
-                Lit::Anew(falling) => falling,
-                Lit::AsBefore(light) => return light.clone(),
+                PixelIllumination::Anew(falling) => falling,
+                PixelIllumination::AsBefore(light) => return light.clone(),
             };
             let echoes = merged(&mut falling.glints, sigma, resolution);
             let background = PixelLight::background(falling.background_hz);
@@ -210,7 +212,7 @@ impl Scene {
             });
             let light = echoes.fold(background, PixelLight::with_echo);
             let light = match &fog {
-                Some(fog) => fog.onto(light, &view.ends_m, off_axis.signal, sigma, centre_fs),
+                Some(fog) => fog.add_to(light, &view.ends_m, off_axis.signal, sigma, centre_fs),
                 None => light,
             };
             let trains = falling.trains.into_iter();
@@ -271,7 +273,7 @@ impl Scene {
 
 /// How a macropixel comes by its light.
 #[derive(Debug)]
-enum Lit<'a> {
+enum PixelIllumination<'a> {
     /// It sees what it saw.
     AsBefore(&'a PixelLight),
     Anew(Falling),
@@ -316,7 +318,7 @@ fn with_crosstalk(falling: &[Falling], spads: &SpadModel, cols: usize) -> Vec<Fa
     let rows = falling.len() / cols;
     let avalanches = falling.par_iter().map(|own| own.avalanches(all, dead_fs));
     let avalanches: Vec<Vec<Glint>> = avalanches.collect();
-    let of = |pixel: usize| {
+    let with_neighbours = |pixel: usize| {
         let (row, col) = (pixel / cols, pixel % cols);
         let mut own = falling[pixel].clone();
         let neighbours = [
@@ -338,7 +340,10 @@ fn with_crosstalk(falling: &[Falling], spads: &SpadModel, cols: usize) -> Vec<Fa
         }
         own
     };
-    (0..falling.len()).into_par_iter().map(of).collect()
+    (0..falling.len())
+        .into_par_iter()
+        .map(with_neighbours)
+        .collect()
 }
 
 /// A macropixel's light over all segments; segments with the same light are one.

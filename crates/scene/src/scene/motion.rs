@@ -8,21 +8,21 @@
 use glam::DVec3;
 
 use super::object::Object;
-use super::rig::{Rig, along};
+use super::rig::{Rig, interpolate};
 use super::settings::Scene;
 
 impl Scene {
     /// The scene as it stands still at `time_s` (negative times are before the described one), as the rig sees it from
     /// where it is by then: every object is where its motion has taken it, and at rest.
-    pub fn at(&self, time_s: f64) -> Scene {
+    pub fn snapshot(&self, time_s: f64) -> Scene {
         let mut scene = self.clone();
         if self.is_still() {
             return scene;
         }
-        let (position_m, yaw_deg) = self.rig.at(time_s);
+        let (position_m, yaw_deg) = self.rig.pose(time_s);
         for object in &mut scene.objects {
             let points = object.waypoints.iter().map(|&at| at.into());
-            let displacement_m = match along(points, time_s) {
+            let displacement_m = match interpolate(points, time_s) {
                 Some([_, x, y, z]) => DVec3::new(x, y, z),
                 None => object.velocity_m_s * time_s,
             };
@@ -58,7 +58,7 @@ impl Scene {
         const STEPS: u32 = 16;
         let times = (0..=STEPS).map(|n| duration_s * f64::from(n) / f64::from(STEPS));
         let times: Vec<f64> = times.collect();
-        let rig: Vec<(DVec3, f64)> = times.iter().map(|&time_s| self.rig.at(time_s)).collect();
+        let rig: Vec<(DVec3, f64)> = times.iter().map(|&time_s| self.rig.pose(time_s)).collect();
         let turn_deg = rig
             .windows(2)
             .map(|pair| (pair[1].1 - pair[0].1).abs())
@@ -66,7 +66,7 @@ impl Scene {
         let way_m = |object: &Object| -> f64 {
             let places = times.iter().zip(&rig).map(|(&time_s, (rig_m, _))| {
                 let points = object.waypoints.iter().map(|&at| at.into());
-                match along(points, time_s) {
+                match interpolate(points, time_s) {
                     Some([_, x, y, z]) => DVec3::new(x, y, z) - *rig_m,
                     None => object.velocity_m_s * time_s - *rig_m,
                 }
@@ -103,17 +103,20 @@ mod tests {
     fn a_scene_at_a_time_stands_still_where_motion_has_taken_it() {
         let mut scene = Scene::outdoor();
         assert!(scene.is_still());
-        assert_eq!(scene.at(7.0), scene);
+        assert_eq!(scene.snapshot(7.0), scene);
         let end = scene.objects.len() - 1;
         scene.objects[end].velocity_m_s = DVec3::new(0.0, 0.0, -10.0);
         assert!(!scene.is_still());
         let ahead = Ray::new(DVec3::ZERO, DVec3::new(0.0, -0.05, 1.0));
         let range_m = |scene: &Scene| scene.hit(&ahead).unwrap().range_m;
-        let later = scene.at(2.0);
+        let later = scene.snapshot(2.0);
         assert!(later.is_still());
         let expected = 20.0 / ahead.direction.z;
         assert!((range_m(&scene) - range_m(&later) - expected).abs() < 1e-9);
-        assert_eq!(scene.at(0.0).objects[end].shape, scene.objects[end].shape);
+        assert_eq!(
+            scene.snapshot(0.0).objects[end].shape,
+            scene.objects[end].shape
+        );
     }
 
     #[test]
@@ -128,11 +131,11 @@ mod tests {
             (9.0, 1.0),
         ] {
             assert_eq!(
-                along(points.into_iter(), time_s),
+                interpolate(points.into_iter(), time_s),
                 Some([time_s.clamp(1.0, 4.0), place])
             );
         }
-        assert_eq!(along(std::iter::empty::<[f64; 2]>(), 1.0), None);
+        assert_eq!(interpolate(std::iter::empty::<[f64; 2]>(), 1.0), None);
     }
 
     fn still_life() -> Scene {
@@ -193,10 +196,10 @@ mod tests {
         ) {
             let mut scene = still_life();
             scene.rig = Rig { velocity_m_s: DVec3::new(right, down, forward), yaw_rate_deg_s, waypoints: vec![] };
-            let (position_m, yaw_deg) = scene.rig.at(time_s);
+            let (position_m, yaw_deg) = scene.rig.pose(time_s);
             let (sine, cosine) = yaw_deg.to_radians().sin_cos();
             let direction = DVec3::new(x, y, 1.0);
-            let seen = scene.at(time_s).hit(&Ray::new(DVec3::ZERO, direction));
+            let seen = scene.snapshot(time_s).hit(&Ray::new(DVec3::ZERO, direction));
             let expected = scene.hit(&Ray::new(position_m, turned(direction, (cosine, sine))));
             match (seen, expected) {
                 (Some(seen), Some(expected)) => {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::rig::Waypoint;
-use super::shape::{Placed, Shape};
+use super::shape::{PlacedShape, Shape};
 use super::texture::Texture;
 
 /// A thing that reflects light, evenly and diffusely.
@@ -62,7 +62,7 @@ impl Object {
     }
 
     /// Reflectivity for the laser and for the cameras at a point of the surface of `placed`, the object's shape.
-    pub(super) fn material_at(&self, placed: &Placed, point: DVec3, part: u32) -> (f64, f64) {
+    pub(super) fn material_at(&self, placed: &PlacedShape, point: DVec3, part: u32) -> (f64, f64) {
         let (own_reflectivity, own_grey) = placed.own_material(point);
         let reflectivity = own_reflectivity.unwrap_or(self.reflectivity);
         let grey = own_grey.or(self.grey).unwrap_or(reflectivity);

@@ -16,7 +16,7 @@
 use std::f64::consts::{LN_2, PI};
 
 use super::camera::PinholeCamera;
-use super::curve::{Curve, Measured};
+use super::curve::{Curve, CurveSetting};
 use super::settings::{Lidar, Scene};
 use super::words::{BeamWord, PdeWord, VignettingWord};
 use crate::numerics::integrate;
@@ -45,11 +45,11 @@ impl Lidar {
     /// sun's irradiance is known.
     pub(super) fn filter_at(&self, wavelength_nm: f64) -> Option<f64> {
         match &self.filter {
-            Measured::Curve(curve) => {
+            CurveSetting::Curve(curve) => {
                 let cold_nm = wavelength_nm - self.filter_shift_nm();
-                Some(curve.at(cold_nm).unwrap_or(0.0))
+                Some(curve.interpolate(cold_nm).unwrap_or(0.0))
             }
-            Measured::Word(word) => {
+            CurveSetting::Word(word) => {
                 let filter = self.filter_of(word.shape()?);
                 Some(filter.transmission(wavelength_nm))
             }
@@ -64,10 +64,10 @@ impl Lidar {
     /// Detection efficiency at a wavelength, relative to that at the laser's.
     pub(super) fn relative_pde(&self, wavelength_nm: f64) -> f64 {
         match &self.pde_curve {
-            Measured::Word(PdeWord::Flat) => 1.0,
-            Measured::Curve(curve) => {
-                let own = curve.at(self.warm_wavelength_nm()).unwrap_or(0.0);
-                curve.at(wavelength_nm).unwrap_or(0.0) / own
+            CurveSetting::Word(PdeWord::Flat) => 1.0,
+            CurveSetting::Curve(curve) => {
+                let own = curve.interpolate(self.warm_wavelength_nm()).unwrap_or(0.0);
+                curve.interpolate(wavelength_nm).unwrap_or(0.0) / own
             }
         }
     }
@@ -75,11 +75,11 @@ impl Lidar {
     /// Sunlight in full sun (100 klux), W/m²: as much of the laser's wavelength gives as many detected photons.
     pub(super) fn effective_irradiance_w_m2(&self) -> f64 {
         let (from, to) = match &self.filter {
-            Measured::Curve(curve) => {
+            CurveSetting::Curve(curve) => {
                 let (from, to) = curve.ends();
                 (from + self.filter_shift_nm(), to + self.filter_shift_nm())
             }
-            Measured::Word(word) => match word.shape() {
+            CurveSetting::Word(word) => match word.shape() {
                 None => return self.solar_irradiance_w_m2,
                 Some(shape) => self.filter_of(shape).passband_nm(),
             },
@@ -95,10 +95,10 @@ impl Lidar {
         let (centre_nm, fwhm_nm) = (self.filter_centre_nm + shift_nm, self.filter_fwhm_nm);
         breaks.extend((-16..=16).map(|k| centre_nm + f64::from(k) * fwhm_nm / 4.0));
         let own = |curve: &Curve| -> Vec<f64> { curve.points.iter().map(|[nm, _]| *nm).collect() };
-        if let Measured::Curve(curve) = &self.filter {
+        if let CurveSetting::Curve(curve) = &self.filter {
             breaks.extend(own(curve).iter().map(|nm| nm + shift_nm));
         }
-        if let Measured::Curve(curve) = &self.pde_curve {
+        if let CurveSetting::Curve(curve) = &self.pde_curve {
             breaks.extend(own(curve));
         }
         breaks.retain(|nm| (from..=to).contains(nm));
@@ -148,7 +148,7 @@ impl Lidar {
                 "spad_tail_share means nothing without a time constant; give spad_tail_ps, too";
             return fault("spad_tail_share", message.into());
         }
-        if let Measured::Curve(curve) = &self.filter
+        if let CurveSetting::Curve(curve) = &self.filter
             && curve.greatest() > 1.0
         {
             let message = format!(
@@ -157,10 +157,10 @@ impl Lidar {
             );
             return fault("filter", message);
         }
-        if let Measured::Curve(curve) = &self.pde_curve
+        if let CurveSetting::Curve(curve) = &self.pde_curve
             && let Some(nm) = [self.wavelength_nm, nm]
                 .into_iter()
-                .find(|&nm| curve.at(nm).unwrap_or(0.0) <= 0.0)
+                .find(|&nm| curve.interpolate(nm).unwrap_or(0.0) <= 0.0)
         {
             let message = format!(
                 "pde_curve has no detection efficiency at the laser's {nm} nm; give a curve that does"
@@ -204,14 +204,16 @@ impl Lidar {
     /// Intensity of the beam at an angle off the axis, in any unit; `None` for one that gives all macropixels the same.
     pub(super) fn beam_at(&self, angle_rad: f64) -> Option<f64> {
         match &self.beam {
-            Measured::Word(BeamWord::Uniform) => None,
-            Measured::Word(BeamWord::Gaussian) => {
+            CurveSetting::Word(BeamWord::Uniform) => None,
+            CurveSetting::Word(BeamWord::Gaussian) => {
                 let half_widths = 2.0 * angle_rad.to_degrees() / self.beam_fwhm_deg;
                 Some(libm::exp(
                     -std::f64::consts::LN_2 * half_widths * half_widths,
                 ))
             }
-            Measured::Curve(curve) => Some(curve.at(angle_rad.to_degrees()).unwrap_or(0.0)),
+            CurveSetting::Curve(curve) => {
+                Some(curve.interpolate(angle_rad.to_degrees()).unwrap_or(0.0))
+            }
         }
     }
 
@@ -233,13 +235,15 @@ impl Lidar {
     /// Relative illumination at an angle off the axis.
     fn illumination_at(&self, cosine: f64) -> Option<f64> {
         match &self.vignetting {
-            Measured::Word(VignettingWord::None) => None,
-            Measured::Word(VignettingWord::Cos4) => Some(cosine.powi(4)),
-            Measured::Curve(curve) => {
+            CurveSetting::Word(VignettingWord::None) => None,
+            CurveSetting::Word(VignettingWord::Cos4) => Some(cosine.powi(4)),
+            CurveSetting::Curve(curve) => {
                 let [[_, middle], ..] = curve.points[..] else {
                     return Some(0.0);
                 };
-                let at = curve.at(libm::acos(cosine).to_degrees()).unwrap_or(0.0);
+                let at = curve
+                    .interpolate(libm::acos(cosine).to_degrees())
+                    .unwrap_or(0.0);
                 Some(at / middle.max(f64::MIN_POSITIVE))
             }
         }
@@ -280,11 +284,11 @@ impl Scene {
         let uniform = lidar
             .spot
             .share_per_pixel(camera.height, camera.width, pitch);
-        let total = lidar.beam.curve().is_some() || lidar.beam != Measured::default();
+        let total = lidar.beam.curve().is_some() || lidar.beam != CurveSetting::default();
         let total = total.then(|| lidar.beam_total());
         let pixels =
             (0..camera.height).flat_map(|row| (0..camera.width).map(move |col| (row, col)));
-        let of = |(row, col): (u32, u32)| {
+        let pixel_optics = |(row, col): (u32, u32)| {
             let ray = camera.at_unit_depth((f64::from(col) + 0.5, f64::from(row) + 0.5));
             let cosine = 1.0 / ray.length();
             let cube = cosine.powi(3);
@@ -298,7 +302,7 @@ impl Scene {
                 background: lens.unwrap_or(1.0),
             }
         };
-        pixels.map(of).collect()
+        pixels.map(pixel_optics).collect()
     }
 
     /// The measured laser pulse, whose times add to those of the Gaussian; `None` for a Gaussian alone.
@@ -313,12 +317,12 @@ impl Scene {
         });
         let samples = if is_even { points.len() } else { PULSE_SAMPLES };
         let step_ns = (last - first) / (samples - 1) as f64;
-        let at = |n: usize| {
+        let power = |n: usize| {
             curve
-                .at((first + n as f64 * step_ns).min(last))
+                .interpolate((first + n as f64 * step_ns).min(last))
                 .unwrap_or(0.0)
         };
-        let powers: Vec<f64> = (0..samples).map(at).collect();
+        let powers: Vec<f64> = (0..samples).map(power).collect();
         let step = Time::from_s(step_ns * 1e-9);
         PulseShape::new(step, &powers).ok()
     }

@@ -80,7 +80,7 @@ impl From<RigWaypoint> for [f64; 5] {
 
 /// Straight from each point to the next at even speed, standing still before the first and after the last; `None` without
 /// points.
-pub(super) fn along<const N: usize>(
+pub(super) fn interpolate<const N: usize>(
     points: impl Iterator<Item = [f64; N]>,
     time_s: f64,
 ) -> Option<[f64; N]> {
@@ -102,9 +102,9 @@ pub(super) fn along<const N: usize>(
 
 impl Rig {
     /// Place in the world, m, and turn to the right, degrees.
-    pub(crate) fn at(&self, time_s: f64) -> (DVec3, f64) {
+    pub(crate) fn pose(&self, time_s: f64) -> (DVec3, f64) {
         let points = self.waypoints.iter().map(|&at| at.into());
-        match along(points, time_s) {
+        match interpolate(points, time_s) {
             Some([_, x, y, z, yaw_deg]) => (DVec3::new(x, y, z), yaw_deg),
             None => (self.velocity_m_s * time_s, self.yaw_rate_deg_s * time_s),
         }

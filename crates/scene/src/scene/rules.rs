@@ -13,7 +13,7 @@ impl Scene {
     /// # Errors
     /// For every value that is NaN, infinite, or outside its range.
     pub fn validate(&self, source: &str) -> Result<(), InputError> {
-        Scene::read(&Document::of(source, self.table())).map(|_| ())
+        Scene::read(&Document::from_table(source, self.table())).map(|_| ())
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 use glam::DVec3;
 
 use super::camera::PinholeCamera;
-use super::curve::Measured;
+use super::curve::CurveSetting;
 use super::interferer::Interferer;
 use super::medium::Medium;
 use super::object::Object;
@@ -29,7 +29,7 @@ pub(super) const REFERENCE_C: f64 = 25.0;
 
 /// A world and the optics through which it is seen. By default there is nothing in it.
 ///
-/// What moves is described where it is at time 0; [`Scene::at`] gives the scene at other times.
+/// What moves is described where it is at time 0; [`Scene::snapshot`] gives the scene at other times.
 ///
 /// Read one with [`Scene::parse`] or [`Scene::load`], or take [`Scene::outdoor`]. After changing
 /// fields call [`Scene::validate`].
@@ -97,11 +97,11 @@ keys! {
         /// Laser pulse.
         ///
         /// The centre of mass of a measured one leaves with the STOP edge.
-        pulse: Measured<PulseWord> = Measured::default(),
+        pulse: CurveSetting<PulseWord> = CurveSetting::default(),
             in WordOrCurve(PulseWord::NAMES, "time in ns and power"),
             from "thesis 6.4.2";
         /// Where the laser's energy goes: uniform is as spot says.
-        beam: Measured<BeamWord> = Measured::default(),
+        beam: CurveSetting<BeamWord> = CurveSetting::default(),
             in WordOrCurve(BeamWord::NAMES, "degrees off the axis and intensity"),
             from "thesis Eq. 7";
         /// Full width at half maximum of a Gaussian beam.
@@ -113,7 +113,7 @@ keys! {
         /// Photon detection efficiency of the SPADs at the laser's wavelength.
         pde: f64 = 0.185, in SHARE, from "thesis Table 6";
         /// Photon detection efficiency over wavelength, for sunlight.
-        pde_curve: Measured<PdeWord> = Measured::default(),
+        pde_curve: CurveSetting<PdeWord> = CurveSetting::default(),
             in WordOrCurve(
                 PdeWord::NAMES,
                 "wavelength in nm and efficiency, of which only the shape counts",
@@ -128,7 +128,7 @@ keys! {
         /// Share of the light that lens and filter let through.
         transmittance: f64 = 1.0, in SHARE, from "thesis Eq. 15, where it is left out";
         /// Illumination off the axis by an evenly bright scene.
-        vignetting: Measured<VignettingWord> = Measured::default(),
+        vignetting: CurveSetting<VignettingWord> = CurveSetting::default(),
             in WordOrCurve(
                 VignettingWord::NAMES,
                 "degrees off the axis and illumination of the array",
@@ -143,14 +143,14 @@ keys! {
         /// In widths of a macropixel.
         stray_radius: f64 = 2.0, in Above(0.0, 100.0), from "chosen";
         /// How stray light falls off with the distance.
-        stray: Measured<StrayWord> = Measured::default(),
+        stray: CurveSetting<StrayWord> = CurveSetting::default(),
             in WordOrCurve(
                 StrayWord::NAMES,
                 "widths of a macropixel and light, of which only the shape counts",
             ),
             from "chosen: a cube, as of surfaces that scatter little";
         /// Band-pass filter, through which ASTM G173 sunlight comes; irradiance is one that lets solar_irradiance_w_m2 through.
-        filter: Measured<FilterWord> = Measured::default(),
+        filter: CurveSetting<FilterWord> = CurveSetting::default(),
             in WordOrCurve(FilterWord::NAMES, "wavelength in nm and transmittance"),
             from "thesis 2.3.3";
         /// Centre of the filter, if it is given as a shape.

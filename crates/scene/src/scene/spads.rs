@@ -1,7 +1,7 @@
 //! SPADs that differ: detection efficiency and dark counts of each SPAD of the array, hot ones among them.
 
 use super::settings::{Lidar, Scene};
-use crate::photon::{Purpose, SpadSpread, normal, random_stream};
+use crate::photon::{RandomPurpose, SpadSpread, normal, random_stream};
 
 impl Lidar {
     /// Whether SPADs differ.
@@ -25,8 +25,12 @@ impl Scene {
         let mean_hz = lidar.dark_counts_hz() / spads as f64;
         let (mut factors, mut dark_hz) = (Vec::new(), Vec::new());
         for spad in 0..spads as u32 {
-            let mut random =
-                random_stream(lidar.spad_seed.into(), Purpose::SpadSpread, pixel, spad);
+            let mut random = random_stream(
+                lidar.spad_seed.into(),
+                RandomPurpose::SpadSpread,
+                pixel,
+                spad,
+            );
             let is_hot = f64::from(random.next_u32()) < lidar.hot_spad_share * 2f64.powi(32);
             factors.push((1.0 + lidar.pde_spread * normal(&mut random)).max(0.0));
             let spread = lidar.dark_count_spread;

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::curve::Measured;
+use super::curve::CurveSetting;
 use super::illumination::Falling;
 use super::settings::{Lidar, Scene};
 use crate::photon::{Glint, PulseTrain, merged};
@@ -42,14 +42,14 @@ struct Halo {
 }
 
 impl Halo {
-    fn of(lidar: &Lidar, rows: usize, cols: usize) -> Self {
+    fn new(lidar: &Lidar, rows: usize, cols: usize) -> Self {
         let aspect = lidar.macropixel_aspect;
         let radius = lidar.stray_radius;
         let strength = |row: f64, col: f64| {
             let away = libm::hypot(row * aspect, col);
             match &lidar.stray {
-                Measured::Word(_) => libm::pow(1.0 + (away / radius).powi(2), -1.5),
-                Measured::Curve(curve) => curve.at(away).unwrap_or(0.0),
+                CurveSetting::Word(_) => libm::pow(1.0 + (away / radius).powi(2), -1.5),
+                CurveSetting::Curve(curve) => curve.interpolate(away).unwrap_or(0.0),
             }
         };
         let cells = (-SUMMED..=SUMMED)
@@ -64,10 +64,10 @@ impl Halo {
         // Beyond, the integral of the power.
         let end = f64::from(SUMMED) * aspect.min(1.0);
         let far = match &lidar.stray {
-            Measured::Word(_) => {
+            CurveSetting::Word(_) => {
                 std::f64::consts::TAU * radius.powi(3) / libm::hypot(radius, end) / aspect
             }
-            Measured::Curve(_) => 0.0,
+            CurveSetting::Curve(_) => 0.0,
         };
         let unit = lidar.stray_share / (near + far);
         let place = |at: usize| ((at / cols) as f64, (at % cols) as f64);
@@ -110,7 +110,7 @@ struct Cells {
 }
 
 impl Cells {
-    fn of(falling: &[Falling], length_fs: f64) -> Self {
+    fn new(falling: &[Falling], length_fs: f64) -> Self {
         let by_number = |light: &Falling| {
             let mut sums = BTreeMap::<Cell, Moments>::new();
             let mut add = |(laser, surface), photons: f64, time_fs: f64, variance_fs2: f64| {
@@ -178,13 +178,13 @@ impl Cells {
 /// Light on all macropixels of a scene with what the lens scatters; dark counts do not come through it.
 pub(super) fn with_stray_light(scene: &Scene, falling: &[Falling], cols: usize) -> Vec<Falling> {
     let dark_hz = scene.dark_hz();
-    let halo = Halo::of(&scene.lidar, falling.len() / cols, cols);
+    let halo = Halo::new(&scene.lidar, falling.len() / cols, cols);
     let cell_fs = CELL * scene.pulse_resolution().as_fs() as f64;
-    let cells = Cells::of(falling, cell_fs.max(1.0));
+    let cells = Cells::new(falling, cell_fs.max(1.0));
     // Beyond surfaces that are seen, and those that throw light on them.
     let first_surface = 2 * scene.objects.len();
     let trains: Vec<&PulseTrain> = falling.iter().flat_map(|light| &light.trains).collect();
-    let of = |to: usize| {
+    let received = |to: usize| {
         let mut own = Falling {
             background_hz: dark_hz,
             ..falling[to].clone()
@@ -227,7 +227,7 @@ pub(super) fn with_stray_light(scene: &Scene, falling: &[Falling], cols: usize) 
         }
         own
     };
-    (0..falling.len()).into_par_iter().map(of).collect()
+    (0..falling.len()).into_par_iter().map(received).collect()
 }
 
 #[cfg(test)]
@@ -270,17 +270,21 @@ mod tests {
         let middle = 16 * 33 + 16;
         let all = signals(&plain)[middle];
         let spread = signals(&halo);
-        let at = |row: i32, col: i32| spread[((16 + row) * 33 + 16 + col) as usize] / all;
+        let strength = |row: i32, col: i32| spread[((16 + row) * 33 + 16 + col) as usize] / all;
         let law = |r: f64| 0.05 / (std::f64::consts::TAU * 4.0) * (1.0 + r * r / 4.0).powf(-1.5);
         for (row, col) in [(1, 0), (0, -3), (4, 4), (-9, 2), (16, 16)] {
             let expected = law(f64::from(row * row + col * col).sqrt());
             assert!(
-                (at(row, col) / expected - 1.0).abs() < 0.02,
+                (strength(row, col) / expected - 1.0).abs() < 0.02,
                 "{row} {col}: {}",
-                at(row, col)
+                strength(row, col)
             );
         }
-        assert!((at(0, 0) - (0.95 + law(0.0))).abs() < 1e-3, "{}", at(0, 0));
+        assert!(
+            (strength(0, 0) - (0.95 + law(0.0))).abs() < 1e-3,
+            "{}",
+            strength(0, 0)
+        );
         // What misses the array: about 2 w / side of the halo.
         let total: f64 = spread.iter().sum::<f64>() / all;
         assert!((0.992..0.996).contains(&total), "{total}");

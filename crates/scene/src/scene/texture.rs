@@ -104,7 +104,7 @@ impl Picture {
             (first, (first + 1) % count, at - at.floor())
         };
         let ((left, right, to_right), (top, bottom, down)) = (cell(x, width), cell(y, height));
-        let value = |row, col| f64::from(self.raster.at(row, col));
+        let value = |row, col| f64::from(self.raster.value(row, col));
         let row = |row| value(row, left) * (1.0 - to_right) + value(row, right) * to_right;
         row(top) * (1.0 - down) + row(bottom) * down
     }
@@ -176,9 +176,9 @@ fn noise((u, v): (f64, f64), seed: u32) -> f64 {
     let (mut sum, mut squares) = (0.0, 0.0);
     for octave in 0..OCTAVES {
         let (right, down) = (smooth(places[octave][0]), smooth(places[octave][1]));
-        let above = between(values[0][octave], values[1][octave], right);
-        let below = between(values[2][octave], values[3][octave], right);
-        sum += strengths[octave] * between(above, below, down);
+        let above = mix(values[0][octave], values[1][octave], right);
+        let below = mix(values[2][octave], values[3][octave], right);
+        sum += strengths[octave] * mix(above, below, down);
         squares += strengths[octave] * strengths[octave];
     }
     // Two standard deviations of the sum, of which a lattice's is 1/sqrt(12) times what is left between corners, about
@@ -193,7 +193,7 @@ fn smooth(t: f64) -> f64 {
 }
 
 #[inline(always)]
-fn between(a: f64, b: f64, share: f64) -> f64 {
+fn mix(a: f64, b: f64, share: f64) -> f64 {
     a + (b - a) * share
 }
 

@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 use super::bounds::Bounds;
 use super::cast::Stage;
 use super::settings::Scene;
-use super::unmoved::Moved;
+use super::unmoved::MovedObjects;
 use super::view::{Surface, View, cone};
 use crate::photon::DEEP;
 use crate::units::TimeOfFlight;
@@ -39,7 +39,7 @@ pub struct GroundTruth {
 
 /// A world that stands still, and what was seen of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Before<'a> {
+pub struct PreviousWorld<'a> {
     /// The world.
     pub world: &'a Scene,
     /// What was seen of it.
@@ -58,14 +58,17 @@ impl GroundTruth {
         scene: &Scene,
         rows: u32,
         cols: u32,
-        before: Option<Before<'_>>,
+        before: Option<PreviousWorld<'_>>,
     ) -> (Self, usize) {
         let moved = before.and_then(|before| {
             debug_assert_eq!((before.truth.rows, before.truth.cols), (rows, cols));
-            Some((Moved::between(before.world, scene)?, before.truth))
+            Some((
+                MovedObjects::from_worlds(before.world, scene)?,
+                before.truth,
+            ))
         });
         let camera = scene.lidar_camera(rows, cols);
-        let (stage, bounds) = (Stage::of(scene), Bounds::of(scene, DVec3::ZERO));
+        let (stage, bounds) = (Stage::new(scene), Bounds::from_scene(scene, DVec3::ZERO));
         let place = |pixel: u32| (pixel / cols, pixel % cols);
         let deep_m = DEEP * scene.pulse_resolution().as_range_m();
         let is_kept = |pixel: u32| {
@@ -80,7 +83,7 @@ impl GroundTruth {
                 (before.views[pixel].clone(), before.surfaces[pixel].clone())
             }
             _ => {
-                let view = View::of(&stage, &bounds, &camera, place(pixel), deep_m);
+                let view = View::new(&stage, &bounds, &camera, place(pixel), deep_m);
                 let surfaces = view.surfaces(&scene.medium);
                 (Arc::new(view), surfaces)
             }

@@ -16,7 +16,7 @@ use super::settings::Scene;
 
 /// Objects that are not the same in two worlds.
 #[derive(Debug)]
-pub(super) struct Moved {
+pub(super) struct MovedObjects {
     /// Of each object, whether it is.
     is_moved: Vec<bool>,
     has_mirror: Vec<bool>,
@@ -24,9 +24,9 @@ pub(super) struct Moved {
     bounds: [Bounds; 2],
 }
 
-impl Moved {
+impl MovedObjects {
     /// Those from one world to another; `None` where all has to be looked at again.
-    pub(super) fn between(before: &Scene, now: &Scene) -> Option<Self> {
+    pub(super) fn from_worlds(before: &Scene, now: &Scene) -> Option<Self> {
         let has_one_look = before.lidar == now.lidar
             && before.light == now.light
             && before.medium == now.medium
@@ -40,17 +40,17 @@ impl Moved {
         let pairs = before.objects.iter().zip(&now.objects);
         let is_moved: Vec<bool> = pairs.map(|(before, now)| before != now).collect();
         let is_any = is_moved.contains(&true);
-        (!is_any || now.towards_sun().is_none()).then(|| Moved {
+        (!is_any || now.towards_sun().is_none()).then(|| MovedObjects {
             is_moved,
             has_mirror: now.objects.iter().map(|o| o.mirror > 0.0).collect(),
-            bounds: [before, now].map(|world| Bounds::of(world, DVec3::ZERO)),
+            bounds: [before, now].map(|world| Bounds::from_scene(world, DVec3::ZERO)),
         })
     }
 
     /// Whether looks from the lidar within a cone meet none of them, before or now.
     pub(super) fn is_out_of_sight(&self, cone: Cone) -> bool {
         self.bounds.iter().all(|bounds| {
-            let seen = bounds.about(cone);
+            let seen = bounds.candidates(cone);
             let mut seen = seen.iter().map(|&object| object as usize);
             seen.all(|object| !self.is_moved[object] && !self.has_mirror[object])
         })
@@ -61,7 +61,7 @@ impl Moved {
 mod tests {
     use super::*;
     use crate::photon::SpadModel;
-    use crate::scene::{Before, GroundTruth, Object, Shape};
+    use crate::scene::{GroundTruth, Object, PreviousWorld, Shape};
     use crate::units::Time;
     use proptest::prelude::*;
 
@@ -134,7 +134,7 @@ mod tests {
             };
             let truth = GroundTruth::render(&before, 20, 24);
             let light = before.light_after(&truth, &spads, None);
-            let seen = Before { world: &before, truth: &truth };
+            let seen = PreviousWorld { world: &before, truth: &truth };
             let (kept, _) = GroundTruth::render_after(&now, 20, 24, Some(seen));
             let anew = GroundTruth::render(&now, 20, 24);
             prop_assert_eq!(&kept, &anew);
@@ -149,7 +149,8 @@ mod tests {
         let mut later = places;
         later[1].0 += 0.3;
         let [before, now] = [places, later].map(|places| room(&places, 0.0, None));
-        let moved = Moved::between(&before, &now).expect("nothing but a ball is another");
+        let moved =
+            MovedObjects::from_worlds(&before, &now).expect("nothing but a ball is another");
         let camera = now.lidar_camera(16, 16);
         let cones = (0..16).flat_map(|row| (0..16).map(move |col| (row, col)));
         let kept =
@@ -157,8 +158,8 @@ mod tests {
         let kept = kept.count();
         assert!((150..256).contains(&kept), "{kept}");
         let [lit, sunny] = [None, Some(30.0)].map(|sun| room(&places, 0.0, sun));
-        assert!(Moved::between(&lit, &sunny).is_none());
-        assert!(Moved::between(&sunny, &room(&later, 0.0, Some(30.0))).is_none());
-        assert!(Moved::between(&sunny, &sunny).is_some());
+        assert!(MovedObjects::from_worlds(&lit, &sunny).is_none());
+        assert!(MovedObjects::from_worlds(&sunny, &room(&later, 0.0, Some(30.0))).is_none());
+        assert!(MovedObjects::from_worlds(&sunny, &sunny).is_some());
     }
 }

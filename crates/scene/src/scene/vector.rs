@@ -33,7 +33,7 @@ impl Ray {
     }
 
     /// The point `range_m` along the ray.
-    pub(crate) fn at(&self, range_m: f64) -> DVec3 {
+    pub(crate) fn point(&self, range_m: f64) -> DVec3 {
         self.origin + self.direction * range_m
     }
 }

@@ -19,7 +19,7 @@ use smallvec::SmallVec;
 use super::bounce::Bounce;
 use super::bounds::{Bounds, Cone};
 use super::camera::PinholeCamera;
-use super::cast::{End, First, Return, Returns, Stage};
+use super::cast::{End, First, Stage, SurfaceReturn, SurfaceReturns};
 use super::medium::Medium;
 use super::others_light::OtherLight;
 use super::vector::Ray;
@@ -89,23 +89,24 @@ pub(super) struct View {
 
 impl View {
     /// What a macropixel, by row and column, sees. A surface is deep from `deep_m` on.
-    pub(super) fn of(
+    pub(super) fn new(
         stage: &Stage,
         bounds: &Bounds,
         camera: &PinholeCamera,
         pixel: (u32, u32),
         deep_m: f64,
     ) -> Self {
-        let candidates = bounds.about(cone(camera, pixel));
-        let mut few = SmallVec::<[(Look, First); RAYS_OF_ALL]>::new();
+        let candidates = bounds.candidates(cone(camera, pixel));
+        let mut few = SmallVec::<[(PixelRay, First); RAYS_OF_ALL]>::new();
         for look in looks(camera, pixel, RAYS) {
             few.push((look, stage.meeting_of(&look.ray, &candidates)));
         }
-        let object = |(_, first): &(Look, First)| first.map(|(_, object)| object);
+        let object = |(_, first): &(PixelRay, First)| first.map(|(_, object)| object);
         let mut view = View::default();
         let needs_more = if few.iter().all(|(_, first)| stage.ends_there(first)) {
             // What they end on tells, without a look at what it is made of.
-            let range_m = |(_, first): &(Look, First)| first.map(|(meeting, _)| meeting.range_m);
+            let range_m =
+                |(_, first): &(PixelRay, First)| first.map(|(meeting, _)| meeting.range_m);
             let needs_more = few.iter().any(|ray| object(ray) != object(&few[0]))
                 || is_deep(few.iter().filter_map(range_m), deep_m);
             if !needs_more {
@@ -116,10 +117,11 @@ impl View {
             }
             needs_more
         } else {
-            let follow =
-                |(look, first): &(Look, First)| stage.returns_from(&look.ray, *first, &candidates);
-            let all: Vec<Returns> = few.iter().map(follow).collect();
-            let first = |returns: &Returns| returns.surfaces.first().map(|s| s.hit.object);
+            let follow = |(look, first): &(PixelRay, First)| {
+                stage.returns_from(&look.ray, *first, &candidates)
+            };
+            let all: Vec<SurfaceReturns> = few.iter().map(follow).collect();
+            let first = |returns: &SurfaceReturns| returns.surfaces.first().map(|s| s.hit.object);
             let nth_m = |n: usize| {
                 let nth = all
                     .iter()
@@ -132,7 +134,7 @@ impl View {
             if !needs_more {
                 let piece = Piece::new(camera, RAYS);
                 for ((look, _), returns) in few.iter().zip(&all) {
-                    view.see(stage, &piece, look, &returns.surfaces, &returns.ends);
+                    view.add_ray(stage, &piece, look, &returns.surfaces, &returns.ends);
                 }
             }
             needs_more
@@ -145,7 +147,7 @@ impl View {
                     view.see_end(stage, &piece, &look, &first);
                 } else {
                     let returns = stage.returns_from(&look.ray, first, &candidates);
-                    view.see(stage, &piece, &look, &returns.surfaces, &returns.ends);
+                    view.add_ray(stage, &piece, &look, &returns.surfaces, &returns.ends);
                 }
             }
         }
@@ -158,7 +160,7 @@ impl View {
     }
 
     /// Adds a ray that ends where it first meets something, or in the sky.
-    fn see_end(&mut self, stage: &Stage, piece: &Piece, look: &Look, first: &First) {
+    fn see_end(&mut self, stage: &Stage, piece: &Piece, look: &PixelRay, first: &First) {
         let end = |range_m| {
             [End {
                 range_m,
@@ -167,28 +169,28 @@ impl View {
             }]
         };
         match first {
-            None => self.see(stage, piece, look, &[], &end(f64::INFINITY)),
+            None => self.add_ray(stage, piece, look, &[], &end(f64::INFINITY)),
             Some(first) => {
                 let hit = stage.seen_at(&look.ray, *first);
-                let surface = Return {
+                let surface = SurfaceReturn {
                     hit,
-                    place_m: look.ray.at(hit.range_m),
+                    place_m: look.ray.point(hit.range_m),
                     facing: hit.normal,
                     share: 1.0,
                     share_back: 1.0,
                 };
-                self.see(stage, piece, look, &[surface], &end(hit.range_m));
+                self.add_ray(stage, piece, look, &[surface], &end(hit.range_m));
             }
         }
     }
 
     /// Adds a ray with what sends light back along it, nearest first, and where its light ends.
-    fn see(
+    fn add_ray(
         &mut self,
         stage: &Stage,
         piece: &Piece,
-        look: &Look,
-        surfaces: &[Return],
+        look: &PixelRay,
+        surfaces: &[SurfaceReturn],
         ends: &[End],
     ) {
         let (scene, ray_share) = (stage.scene, piece.ray_share);
@@ -200,7 +202,7 @@ impl View {
             self.end(end.range_m, ray_share * end.share);
         }
         for surface in surfaces {
-            let Return {
+            let SurfaceReturn {
                 hit,
                 place_m,
                 facing,
@@ -300,25 +302,30 @@ fn is_deep(ranges_m: impl Iterator<Item = f64>, deep_m: f64) -> bool {
 
 /// What a macropixel sees.
 pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> Cone {
-    let at = |du: f64, dv: f64| {
+    let direction = |du: f64, dv: f64| {
         let place = (f64::from(col) + du, f64::from(row) + dv);
         camera.at_unit_depth(place).normalize()
     };
-    let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
-    Cone::about(at(0.5, 0.5), corners)
+    let corners = [
+        direction(0.0, 0.0),
+        direction(0.0, 1.0),
+        direction(1.0, 0.0),
+        direction(1.0, 1.0),
+    ];
+    Cone::enclosing(direction(0.5, 0.5), corners)
 }
 
 /// A ray of a macropixel.
 #[derive(Debug, Clone, Copy)]
-struct Look {
+struct PixelRay {
     ray: Ray,
     /// How far it is along the ray to unit depth.
     to_unit_depth: f64,
 }
 
-impl Look {
+impl PixelRay {
     fn new(at_unit_depth: DVec3) -> Self {
-        Look {
+        PixelRay {
             ray: Ray::new(DVec3::ZERO, at_unit_depth),
             to_unit_depth: at_unit_depth.length(),
         }
@@ -352,7 +359,7 @@ fn looks(
     camera: &PinholeCamera,
     (row, col): (u32, u32),
     across: u32,
-) -> impl Iterator<Item = Look> {
+) -> impl Iterator<Item = PixelRay> {
     // Of a power of two, so that nothing is rounded.
     let part = 1.0 / f64::from(across);
     let within = move |n: u32| match across {
@@ -368,12 +375,12 @@ fn looks(
             place(col, x, within(y)),
             place(row, y, within(across - 1 - x)),
         );
-        Look::new(camera.at_unit_depth((u, v)))
+        PixelRay::new(camera.at_unit_depth((u, v)))
     })
 }
 
 /// Variance of the range over the piece of a plane that a rectangle about a ray covers, `width` × `height` at unit depth.
-fn range_variance(look: &Look, normal: DVec3, range_m: f64, [width, height]: [f64; 2]) -> f64 {
+fn range_variance(look: &PixelRay, normal: DVec3, range_m: f64, [width, height]: [f64; 2]) -> f64 {
     let ray = look.ray.direction;
     let across = |side: DVec3, step: f64| {
         // How the ray turns towards that side, and with it the range to a plane.
@@ -414,8 +421,12 @@ mod tests {
             let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
             let exact =
                 ranges.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / ranges.len() as f64;
-            let found =
-                range_variance(&Look::new(direction), normal, range_m(direction), [step; 2]);
+            let found = range_variance(
+                &PixelRay::new(direction),
+                normal,
+                range_m(direction),
+                [step; 2],
+            );
             assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
         }
     }

@@ -31,7 +31,7 @@ pub(super) struct Layout {
 }
 
 impl Signatures {
-    pub(super) fn of(image: &GreyImage, census: Census, layout: Layout) -> Self {
+    pub(super) fn new(image: &GreyImage, census: Census, layout: Layout) -> Self {
         let (width, height) = (image.width(), image.height());
         let planes = census.bits().div_ceil(8);
         let stride = layout.pads.0 + width + layout.pads.1;
@@ -40,7 +40,7 @@ impl Signatures {
         rows.with_min_len(16).for_each_init(
             || Neighbourhood::new(width, census),
             |around, (y, out)| {
-                around.see(image, y);
+                around.load_rows(image, y);
                 for (plane, out) in out.chunks_exact_mut(stride).enumerate() {
                     let out = &mut out[layout.pads.0..][..width];
                     around.compare(plane, out);
@@ -81,7 +81,7 @@ impl Neighbourhood {
         }
     }
 
-    fn see(&mut self, image: &GreyImage, y: usize) {
+    fn load_rows(&mut self, image: &GreyImage, y: usize) {
         let side = self.census.cols / 2;
         let last = image.height() - 1;
         for (i, row) in self.rows.iter_mut().enumerate() {

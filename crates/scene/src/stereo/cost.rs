@@ -48,8 +48,8 @@ impl Costs {
             reversed: true,
         };
         Costs {
-            left: Signatures::of(left, matcher.census, plain),
-            right: Signatures::of(right, matcher.census, turned),
+            left: Signatures::new(left, matcher.census, plain),
+            right: Signatures::new(right, matcher.census, turned),
             width: left.width(),
             min_disparity,
             disparities: matcher.disparities,

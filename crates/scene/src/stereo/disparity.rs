@@ -35,7 +35,7 @@ impl DisparityMap {
     ///
     /// # Panics
     /// Outside the image.
-    pub(crate) fn at(&self, row: usize, col: usize) -> Option<f32> {
+    pub(crate) fn disparity_px(&self, row: usize, col: usize) -> Option<f32> {
         assert!(col < self.width, "column {col} of {}", self.width);
         let d = self.px[row * self.width + col];
         (!d.is_nan()).then_some(d)
@@ -123,12 +123,12 @@ mod tests {
 
     /// Rims of one row, and of the same as a column.
     fn rims_of(px: &[f32], reach_px: usize, gaps_end: bool) -> String {
-        let of = |width, height| {
+        let rims = |width, height| {
             let px = px.to_vec();
             DisparityMap { width, height, px }.rims(reach_px, gaps_end)
         };
-        let row = of(px.len(), 1);
-        assert_eq!(row, of(1, px.len()));
+        let row = rims(px.len(), 1);
+        assert_eq!(row, rims(1, px.len()));
         row.iter().map(|&is| if is { '#' } else { '.' }).collect()
     }
 
@@ -167,6 +167,6 @@ mod tests {
         };
         map.keep(|at, px| at != 3 && px > 2.0);
         assert_eq!(map.matched(), 1);
-        assert_eq!(map.at(1, 0), Some(3.0));
+        assert_eq!(map.disparity_px(1, 0), Some(3.0));
     }
 }

@@ -30,6 +30,6 @@ impl Matcher {
         right: &GreyImage,
     ) -> Result<DisparityMap, MatchError> {
         self.check(left, right)?;
-        Ok(sweep::run(self, workspace, left, right))
+        Ok(sweep::match_images(self, workspace, left, right))
     }
 }

@@ -46,7 +46,7 @@ struct Job<'a> {
 }
 
 /// Matches two images; settings have been checked.
-pub(super) fn run(
+pub(super) fn match_images(
     matcher: &Matcher,
     workspace: &mut Workspace,
     left: &GreyImage,
@@ -139,7 +139,7 @@ impl Job<'_> {
                 }
                 None => sums.fill(0),
             }
-            along(self, self.brightness(row), costs, sums);
+            sum_along_row(self, self.brightness(row), costs, sums);
         });
     }
 
@@ -157,7 +157,7 @@ impl Job<'_> {
     "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx512bitalg",
     "x86_64+avx2"
 ))]
-fn along(job: &Job, brightness: &[u8], costs: &[u8], sums: &mut [u16]) {
+fn sum_along_row(job: &Job, brightness: &[u8], costs: &[u8], sums: &mut [u16]) {
     match job.lanes {
         32 => along_of::<32>(job, brightness, costs, sums),
         64 => along_of::<64>(job, brightness, costs, sums),
@@ -218,13 +218,13 @@ impl Along {
 /// Paths that go down or up the image.
 struct Sweep<'a> {
     job: &'a Job<'a>,
-    ways: Vec<Way>,
+    ways: Vec<PathCosts>,
     /// The row before.
     before: Option<usize>,
 }
 
 /// One direction: L of the row before and of this row, a slot for every column and one more at each end.
-struct Way {
+struct PathCosts {
     /// Columns from the pixel before to this one.
     aside: isize,
     before: Vec<u8>,
@@ -233,11 +233,11 @@ struct Way {
     least_out: Vec<u8>,
 }
 
-impl Way {
+impl PathCosts {
     fn new(job: &Job, aside: isize) -> Self {
         let columns = job.width + 2;
         let slots = || vec![NO_PARTNER; columns * slot(job.lanes)];
-        Way {
+        PathCosts {
             aside,
             before: slots(),
             out: slots(),
@@ -261,7 +261,10 @@ impl<'a> Sweep<'a> {
         };
         Sweep {
             job,
-            ways: asides.iter().map(|&aside| Way::new(job, aside)).collect(),
+            ways: asides
+                .iter()
+                .map(|&aside| PathCosts::new(job, aside))
+                .collect(),
             before: None,
         }
     }
@@ -269,9 +272,9 @@ impl<'a> Sweep<'a> {
     /// Stage B: adds the paths' costs in row `row` to `sums`.
     fn advance(&mut self, row: usize, costs: &[u8], sums: &mut [u16]) {
         let before = self.before.replace(row).unwrap_or(row);
-        self.ways.iter_mut().for_each(Way::next_row);
+        self.ways.iter_mut().for_each(PathCosts::next_row);
         let bright = (self.job.brightness(row), self.job.brightness(before));
-        across(self.job, &mut self.ways, bright, costs, sums);
+        sum_across_rows(self.job, &mut self.ways, bright, costs, sums);
     }
 
     /// Goes through rows and leaves its sums in `kept`.
@@ -327,7 +330,13 @@ impl<'a> Sweep<'a> {
     "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx512bitalg",
     "x86_64+avx2"
 ))]
-fn across(job: &Job, ways: &mut [Way], bright: (&[u8], &[u8]), costs: &[u8], sums: &mut [u16]) {
+fn sum_across_rows(
+    job: &Job,
+    ways: &mut [PathCosts],
+    bright: (&[u8], &[u8]),
+    costs: &[u8],
+    sums: &mut [u16],
+) {
     match job.lanes {
         32 => across_of::<32>(job, ways, bright, costs, sums),
         64 => across_of::<64>(job, ways, bright, costs, sums),
@@ -339,7 +348,7 @@ fn across(job: &Job, ways: &mut [Way], bright: (&[u8], &[u8]), costs: &[u8], sum
 #[inline(always)]
 fn across_of<const LANES: usize>(
     job: &Job,
-    ways: &mut [Way],
+    ways: &mut [PathCosts],
     bright: (&[u8], &[u8]),
     costs: &[u8],
     sums: &mut [u16],

@@ -123,7 +123,7 @@ fn of_row_of<const LANES: usize>(
             let beside = (sums.get(best.wrapping_sub(1)), sums.get(best + 1));
             let beyond = match beside {
                 (Some(&less), Some(&more)) if less.max(more) < no_partner => {
-                    between(less, least, more)
+                    subpixel_offset(less, least, more)
                 }
                 _ => 0.0,
             };
@@ -158,7 +158,7 @@ fn seen_from_right<const LANES: usize>(
 /// Two lines of equal slope through them (q alone instead of (q + q²)/2) leave 0.14 px of a plane's quarter pixel, because a census changes less
 /// the nearer it is to the right place; a parabola leaves 0.19 px and also has a greater median error on a real pair, 0.165 px against 0.150.
 #[inline(always)]
-pub(super) fn between(less: u16, least: u16, more: u16) -> f32 {
+pub(super) fn subpixel_offset(less: u16, least: u16, more: u16) -> f32 {
     let (falls, rises) = (f32::from(less - least), f32::from(more - least));
     if falls.max(rises) == 0.0 {
         return 0.0;

@@ -17,7 +17,7 @@ impl Linearity {
     ///
     /// # Panics
     /// When there are none, or all are empty.
-    pub fn of(widths: &[f64]) -> Self {
+    pub fn from_widths(widths: &[f64]) -> Self {
         let step = widths.iter().sum::<f64>() / widths.len() as f64;
         assert!(step > 0.0, "codes have widths");
         let dnl: Vec<f64> = widths.iter().map(|width| width / step - 1.0).collect();
@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn a_wide_code_is_late_until_narrow_ones_make_up_for_it() {
-        let linearity = Linearity::of(&[150.0, 50.0, 100.0, 100.0]);
+        let linearity = Linearity::from_widths(&[150.0, 50.0, 100.0, 100.0]);
         assert_eq!(linearity.step, 100.0);
         assert_eq!(linearity.dnl, [0.5, -0.5, 0.0, 0.0]);
         assert_eq!(linearity.inl, [0.5, 0.0, 0.0, 0.0]);

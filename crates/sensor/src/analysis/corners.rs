@@ -49,8 +49,8 @@ pub fn factor_range(
     const STEP: u32 = 2_000;
     let (period, phase) = (config.clock().period(), config.stop_phase());
     let timing = |steps: u32| {
-        let scaled = silicon.at(f64::from(steps) * 1e-5);
-        MacropixelTiming::of(config, &scaled, limits, (0, 0))
+        let scaled = silicon.with_factor(f64::from(steps) * 1e-5);
+        MacropixelTiming::analyse(config, &scaled, limits, (0, 0))
     };
     let library = timing(ONE).aim(period, phase);
     let works = |steps, aim| timing(steps).slack(period, phase, aim) >= Time::ZERO;

@@ -71,7 +71,7 @@ impl Photons {
             return WORST_OF_16;
         }
         let settled = |photons: &Photons| {
-            let taken = take(config, silicon, limits, SLOW, photons);
+            let taken = simulate_photons(config, silicon, limits, SLOW, photons);
             taken.map_or(Time::ZERO, |taken| taken.settled)
         };
         let tried = (0..TRIED).map(|number| Photons::random(config.spads(), number));
@@ -93,30 +93,31 @@ pub struct CorrelationTiming {
 
 impl CorrelationTiming {
     /// Simulates the worst photons at a slow clock, and at ever shorter periods.
-    pub fn of(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
+    pub fn simulate(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
         let photons = &Photons::worst(config, silicon, limits);
-        let settled = take(config, silicon, limits, SLOW, photons);
+        let settled = simulate_photons(config, silicon, limits, SLOW, photons);
         CorrelationTiming {
             settled: settled.map_or(Time::MAX, |taken| taken.settled),
             period: shortest_period(SLOW, |period| {
-                take(config, silicon, limits, period, photons).is_some_and(|taken| taken.is_right)
+                simulate_photons(config, silicon, limits, period, photons)
+                    .is_some_and(|taken| taken.is_right)
             }),
         }
     }
 }
 
-struct Taken {
+struct CorrelationRun {
     settled: Time,
     is_right: bool,
 }
 
-fn take(
+fn simulate_photons(
     config: &SensorConfig,
     silicon: &Silicon,
     limits: Limits,
     period: Time,
     photons: &Photons,
-) -> Option<Taken> {
+) -> Option<CorrelationRun> {
     const FIRST: i64 = 6;
     if config.metdc_block.is_some() {
         // Which of its flip-flops holds an event, and how, is its own.
@@ -169,7 +170,7 @@ fn take(
         .iter()
         .rfind(|(t, net, _)| *net == event && *t < launch + period);
     let captured = [FIRST, FIRST + 1].map(|edge| stage_after(&recorder, edge));
-    Some(Taken {
+    Some(CorrelationRun {
         settled: last.map_or(Time::ZERO, |c| c.0 - launch),
         is_right: is_kept && captured == [Some(false), Some(true)],
     })

@@ -54,7 +54,7 @@ pub fn gate_works(
         return false;
     };
     let start = slowest_start(config, silicon);
-    let every = Rises::of(config, start).and_then(|rises| rises.every);
+    let every = Rises::from_start_value(config, start).and_then(|rises| rises.every);
     let exposure = Exposure {
         clock,
         stop_phase: phase,

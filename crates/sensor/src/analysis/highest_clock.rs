@@ -97,7 +97,7 @@ fn broken_limit(
         clk_hz,
         ..config.clone()
     };
-    let worst = TimingVerdict::of(&config, silicon, position)
+    let worst = TimingVerdict::analyse(&config, silicon, position)
         .worst()
         .clone();
     (worst.slack < Time::ZERO).then_some(worst)
@@ -110,18 +110,18 @@ mod tests {
     #[test]
     fn the_chip_of_the_thesis_runs_as_fast_as_its_setup_and_hold_allow() {
         let config = SensorConfig::default();
-        let silicon = Silicon::of(&config);
+        let silicon = Silicon::new(&config);
         let found = highest_clock(&config, &silicon, (0, 0)).unwrap();
         // The table of shortest periods has 2.457 ns for STOP on CLK's fall, to a picosecond.
         assert!((1e9 / found.clk_hz - 2.4565).abs() < 1e-3, "{found:?}");
-        let at = |clk_hz| {
+        let is_met = |clk_hz| {
             let config = SensorConfig {
                 clk_hz,
                 ..config.clone()
             };
-            TimingVerdict::of(&config, &silicon, (0, 0)).is_met()
+            TimingVerdict::analyse(&config, &silicon, (0, 0)).is_met()
         };
-        assert!(at(found.clk_hz) && !at(1.0001 * found.clk_hz));
+        assert!(is_met(found.clk_hz) && !is_met(1.0001 * found.clk_hz));
         assert!(found.limit.unwrap().check.contains("strobe"));
     }
 
@@ -131,7 +131,7 @@ mod tests {
             clk_hz: 415e6,
             ..SensorConfig::default()
         };
-        let found = highest_clock(&config, &Silicon::of(&config), (0, 0)).unwrap();
+        let found = highest_clock(&config, &Silicon::new(&config), (0, 0)).unwrap();
         assert!((1e9 / found.clk_hz - 2.4565).abs() < 1e-3, "{found:?}");
     }
 
@@ -142,7 +142,7 @@ mod tests {
             clk_hz: 500e6,
             ..SensorConfig::default()
         };
-        let found = highest_clock(&config, &Silicon::of(&config), (0, 0)).unwrap();
+        let found = highest_clock(&config, &Silicon::new(&config), (0, 0)).unwrap();
         assert!(found.clk_hz > 500e6, "{found:?}");
         assert!(found.limit.unwrap().check.contains("blocking"));
     }

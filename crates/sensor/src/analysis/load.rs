@@ -34,7 +34,7 @@ pub struct LoadTiming {
 
 impl LoadTiming {
     /// Analyses the load path of this sensor with all its memories.
-    pub fn of(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
+    pub fn analyse(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
         let (rows, cols, bits) = (config.rows, config.cols, config.counter_bits);
         let netlist = Netlist::elaborate(&load_path::with_memories(rows, cols, bits));
         let timing = silicon.timing(&netlist);
@@ -43,7 +43,7 @@ impl LoadTiming {
         let requirements = |cuts: &[NetId]| {
             let corner = silicon.corner;
             let clock = LoadProbe::Clk.net(&netlist);
-            Requirements::of(&netlist, &analysis, clock, cuts, &library, corner)
+            Requirements::new(&netlist, &analysis, clock, cuts, &library, corner)
                 .expect("the load path has no loop")
         };
         // The inverse of ROW_DONE clocks the tokens and gates WRITE.
@@ -109,7 +109,7 @@ pub fn load_works(
         let Ok(clock) = Frequency::from_period(period) else {
             return false;
         };
-        let (end, mut stimulus) = load_stimulus(LoadPins::of(&netlist), clock, &stream);
+        let (end, mut stimulus) = load_stimulus(LoadPins::find(&netlist), clock, &stream);
         let mut checks =
             TimingChecks::new(&netlist, &library, corner).not_before(gates::RESET_RELEASED);
         let mut kernel = Kernel::new(&netlist, &timing);

@@ -94,7 +94,7 @@ impl Aim {
 
 impl MacropixelTiming {
     /// Analyses the macropixel at `position` (row, column) of this sensor: mismatch differs from one to the next.
-    pub fn of(
+    pub fn analyse(
         config: &SensorConfig,
         silicon: &Silicon,
         limits: Limits,
@@ -105,9 +105,9 @@ impl MacropixelTiming {
         let timing = silicon.timing(&circuit.netlist);
         let (library, corner) = (silicon.limits(limits), silicon.corner);
         let paths = circuit.paths(&timing);
-        let delays = MacropixelDelays::of(&paths);
-        let counter = CounterDelays::of(&paths, &delays);
-        let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, corner));
+        let delays = MacropixelDelays::measure(&paths);
+        let counter = CounterDelays::measure(&paths, &delays);
+        let reset = ResetPulse::from_delays(&circuit, (&delays, &counter), (&library, corner));
         let half_load_period = Time::from_fs(config.load_clock().period().as_fs() / 2);
         let (netlist, probes) = (&circuit.netlist, &circuit.probes);
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
@@ -115,11 +115,11 @@ impl MacropixelTiming {
         let (rise, fall) = (clk.arrivals(Edge::Rise), clk.arrivals(Edge::Fall));
 
         // Which CLK edge takes START is the window law's to say, in the library's delays.
-        let is_library = *silicon == Silicon::of(config);
+        let is_library = *silicon == Silicon::new(config);
         let (hits, clk_rest) = circuit.split(clk.all(), !is_library);
         let limit = |kind: CheckKind| {
             let limits = library.checks(CellKind::Dffr);
-            Time::from_fs(limits.at(kind, corner).into())
+            Time::from_fs(limits.limit_fs(kind, corner).into())
         };
         let whole = "the macropixel connects these";
         MacropixelTiming {
@@ -137,7 +137,7 @@ impl MacropixelTiming {
             counter_clk_high: circuit
                 .clocked_by_counter_clk()
                 .map(|cell| library.checks(netlist.cells()[cell].kind))
-                .map(|checks| Time::from_fs(checks.at(CheckKind::ClockHigh, corner).into()))
+                .map(|checks| Time::from_fs(checks.limit_fs(CheckKind::ClockHigh, corner).into()))
                 .max()
                 .expect("a P-counter counts"),
             reset: delays.reset,
@@ -384,7 +384,7 @@ pub struct LocalClocks {
 
 impl LocalClocks {
     /// Analyses macropixel (0, 0), limits kept.
-    pub fn of(config: &SensorConfig, silicon: &Silicon) -> Self {
+    pub fn analyse(config: &SensorConfig, silicon: &Silicon) -> Self {
         let circuit = MacropixelCircuit::new(config, (0, 0));
         let (netlist, probes) = (&circuit.netlist, &circuit.probes);
         let timing = silicon.timing(netlist);
@@ -394,7 +394,7 @@ impl LocalClocks {
         let requirements = |clock: NetId, cuts: &[NetId]| {
             let corner = silicon.corner;
             let analysis = paths.analysis();
-            let found = Requirements::of(netlist, analysis, clock, cuts, &library, corner);
+            let found = Requirements::new(netlist, analysis, clock, cuts, &library, corner);
             found.expect("every loop is cut").all().to_vec()
         };
         // A count's Q only tells whether the bin is full; what else one's own histogram does with it, nobody knows.

@@ -140,7 +140,7 @@ pub struct BlockSilicon {
 impl MacropixelPower {
     /// Simulates macropixel (0, 0) with this start value and these SPAD pulses at gate level, and charges what toggles from
     /// the first STOP edge on.
-    pub fn of(
+    pub fn simulate(
         config: &SensorConfig,
         exposure: &Exposure,
         start: u16,
@@ -154,7 +154,7 @@ impl MacropixelPower {
         let from = origin - exposure.clock.period();
         let mut activity = Activity::new(&netlist, from);
         gate.run(&mut activity);
-        let nets = activity.until(gate.now());
+        let nets = activity.net_activity(gate.now());
         let scope = netlist.scope(gate.probes()[0].macropixel());
         let scope = scope.expect("the simulation has a macropixel");
         let cycles = f64::from(exposure.laser_cycles);
@@ -163,13 +163,13 @@ impl MacropixelPower {
         let outputs = scopes.flat_map(|scope| netlist.cells_of(scope));
         let outputs = outputs.flat_map(|cell| netlist.cells()[cell].output_nets());
         let toggles: u64 = outputs.map(|net| nets[net.index()].toggles).sum();
-        let library = CellLibrary::of(config)
+        let library = CellLibrary::from_config(config)
             .ok()
             .and_then(CellLibrary::from_file);
         let silicon = library.map(|library| {
             let characterised = library.characterised(&netlist);
             let volt = library.liberty.conditions[0].unwrap_or(capacitances.supply_v);
-            let of = |block: usize| {
+            let block_silicon = |block: usize| {
                 let (area, leakage_w) = characterised.silicon(&netlist, &library.liberty, block);
                 let changes = |net: NetId| nets[net.index()].toggles as f64 / cycles;
                 let energy =
@@ -186,7 +186,11 @@ impl MacropixelPower {
                     loads_j: energy[1],
                 }
             };
-            netlist.children(scope).chain([scope]).map(of).collect()
+            netlist
+                .children(scope)
+                .chain([scope])
+                .map(block_silicon)
+                .collect()
         });
         MacropixelPower {
             silicon: silicon.unwrap_or_default(),
@@ -247,7 +251,7 @@ mod tests {
         Kernel::new(&netlist, &timing)
             .run(&mut Stimulus::sorted(drives), end, &mut activity)
             .expect("no loop of cells without delay");
-        let nets = activity.until(end);
+        let nets = activity.net_activity(end);
         assert_eq!(nets[net("A").index()].toggles, 10);
         assert_eq!(nets[net("Q").index()].toggles, 1);
 

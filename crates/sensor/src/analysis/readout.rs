@@ -32,7 +32,7 @@ pub struct ReadTiming {
 fn one_pin(config: &SensorConfig, rows: usize) -> SensorConfig {
     SensorConfig {
         rows,
-        cols: ReadoutOrder::of(config).cols_per_pin,
+        cols: ReadoutOrder::new(config).cols_per_pin,
         readout_pins: 1,
         ..config.clone()
     }
@@ -40,16 +40,16 @@ fn one_pin(config: &SensorConfig, rows: usize) -> SensorConfig {
 
 impl ReadTiming {
     /// Analyses the readout of this sensor. One pin stands for all: their shares of the columns are alike.
-    pub fn of(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
-        let order = ReadoutOrder::of(&one_pin(config, config.rows));
+    pub fn analyse(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
+        let order = ReadoutOrder::new(&one_pin(config, config.rows));
         let netlist = Netlist::elaborate(&with_counts(order));
         let timing = silicon.timing(&netlist);
         let library = silicon.limits(limits);
         let analysis = StaticTiming::new(&netlist, &timing);
-        let pins = ReadPins::of(&netlist);
+        let pins = ReadPins::find(&netlist);
         let words = ReadProbe::Word.bus(&netlist);
         let requirements = |cuts: &[NetId]| {
-            Requirements::of(
+            Requirements::new(
                 &netlist,
                 &analysis,
                 pins.clk,
@@ -76,7 +76,7 @@ impl ReadTiming {
         let set_up = stages.flat_map(|cell| {
             let limits = library.checks(cell.kind);
             Edge::BOTH.map(|edge| {
-                let setup = limits.toward(CheckKind::Setup, edge, silicon.corner);
+                let setup = limits.edge_limit_fs(CheckKind::Setup, edge, silicon.corner);
                 let window = from_words.edge_window(cell.input(0), edge);
                 window.map(|(_, last)| last + Time::from_fs(setup.into()))
             })
@@ -111,9 +111,9 @@ pub fn read_works(
     limits: Limits,
 ) -> impl Fn(Time) -> bool {
     const ROWS: usize = 2;
-    let order = ReadoutOrder::of(&one_pin(config, ROWS));
+    let order = ReadoutOrder::new(&one_pin(config, ROWS));
     let netlist = Netlist::elaborate(&with_counts(order));
-    let pins = ReadPins::of(&netlist);
+    let pins = ReadPins::find(&netlist);
     let most = ((1u32 << order.bits) - 1) as u16;
     let counts: Vec<u16> = (0..ROWS * order.cols * order.bins)
         .map(|i| (i as u16).wrapping_mul(0x9e37).rotate_left(7) & most)

@@ -52,16 +52,16 @@ impl Spread {
 pub fn spread(config: &SensorConfig, silicon: &Silicon, done: impl Fn() + Sync) -> Spread {
     let (period, phase) = (config.clock().period(), config.stop_phase());
     // As the window law has it, which knows of the library's delays only.
-    let library = Silicon::of(config);
-    let library = MacropixelTiming::of(config, &library, Limits::Kept, (0, 0));
+    let library = Silicon::new(config);
+    let library = MacropixelTiming::analyse(config, &library, Limits::Kept, (0, 0));
     let aim = library.aim(period, phase);
     let pixel = |index: usize| {
         let position = config.position(index);
-        let kept = MacropixelTiming::of(config, silicon, Limits::Kept, position);
+        let kept = MacropixelTiming::analyse(config, silicon, Limits::Kept, position);
         let slack = kept.slack(period, phase, aim);
         let keeps_limits = slack >= Time::ZERO;
         let counts_right = keeps_limits || {
-            let ignored = MacropixelTiming::of(config, silicon, Limits::Ignored, position);
+            let ignored = MacropixelTiming::analyse(config, silicon, Limits::Ignored, position);
             ignored.slack(period, phase, aim) >= Time::ZERO
         };
         done();

@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use super::{Aim, LoadTiming, LocalClocks, MacropixelTiming};
 use crate::chip::front_end::DeadTimeTooShort;
-use crate::chip::window_law::Window;
+use crate::chip::window_law::WindowOutcome;
 use crate::chip::{
     ChipTiming, Conflict, Exposure, Limits, Probe, Race, SensorConfig, Silicon, Tdc, WindowLaw,
 };
@@ -118,15 +118,15 @@ impl VerdictReport {
 
 impl TimingVerdict {
     /// Judges the sensor at its CLK, STOP phase, LOAD_CLK and dead time; where macropixels differ, the one at `position`.
-    pub fn of(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
+    pub fn analyse(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
         let (period, phase) = (config.clock().period(), config.stop_phase());
-        let pixel = MacropixelTiming::of(config, silicon, Limits::Kept, position);
-        let library = Silicon::of(config);
+        let pixel = MacropixelTiming::analyse(config, silicon, Limits::Kept, position);
+        let library = Silicon::new(config);
         let is_library = *silicon == library;
         let aim = if is_library {
             pixel.aim(period, phase)
         } else {
-            MacropixelTiming::of(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
+            MacropixelTiming::analyse(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
         };
         let mut margins = pixel_margins(&pixel, period, phase, aim);
         margins.extend(local_margins(config, silicon));
@@ -292,7 +292,7 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
 
 /// Margins of flip-flops with clocks of their own.
 fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
-    let local = LocalClocks::of(config, silicon);
+    let local = LocalClocks::analyse(config, silicon);
     let width = config.pulse_width();
     let mut margins = tightest(
         "SPAD_RAW",
@@ -327,7 +327,7 @@ fn load_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
         rows: config.rows.min(LOADED_ROWS),
         ..config.clone()
     };
-    let load = LoadTiming::of(&rows, silicon, Limits::Kept);
+    let load = LoadTiming::analyse(&rows, silicon, Limits::Kept);
     let period = config.load_clock().period();
     let mut margins = tightest(
         "LOAD_CLK",
@@ -350,8 +350,8 @@ fn law_race(config: &SensorConfig) -> Option<Race> {
     let start = config.largest_start() / 4;
     let periods = 4 * config.step_periods as u32 * (u32::from(config.largest_start()) + 1);
     match WindowLaw::new(config, &Exposure::new(config, periods, 1)).window(start) {
-        Window::Race(race) => Some(race),
-        Window::Open(_) | Window::Never | Window::Irregular(_) => None,
+        WindowOutcome::Race(race) => Some(race),
+        WindowOutcome::Open(_) | WindowOutcome::Never | WindowOutcome::Irregular(_) => None,
     }
 }
 

@@ -7,7 +7,7 @@ use crate::units::Time;
 impl SensorConfig {
     /// Time of one readout.
     pub fn readout_time(&self) -> Time {
-        let periods = ReadoutOrder::of(self).periods();
+        let periods = ReadoutOrder::new(self).periods();
         self.read_clock().periods(periods as i64)
     }
 
@@ -37,7 +37,7 @@ mod tests {
     #[test]
     fn a_frame_takes_its_readout_and_the_load_that_nothing_hides() {
         let mut config = SensorConfig::default();
-        let read_s = ReadoutOrder::of(&config).periods() as f64 / config.read_clock().as_hz();
+        let read_s = ReadoutOrder::new(&config).periods() as f64 / config.read_clock().as_hz();
         let load_s = (config.load_bits() as f64 + 0.5) / config.load_clock().as_hz();
         assert!((config.readout_time().as_s() / read_s - 1.0).abs() < 1e-9);
         assert!((config.load_time().as_s() / load_s - 1.0).abs() < 1e-9);

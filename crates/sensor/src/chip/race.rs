@@ -83,7 +83,7 @@ impl Conflict {
 
 /// The event that the times of a race are counted from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Origin {
+pub enum RaceOrigin {
     /// CLK's fall that the P-counter counts.
     #[error("CLK falls")]
     ClkFalls,
@@ -177,7 +177,7 @@ pub struct Race {
     /// What meets what.
     pub what: Conflict,
     /// The event that times are counted from.
-    pub after: Origin,
+    pub after: RaceOrigin,
     /// When it comes.
     pub comes: Time,
     /// From when on it must not …
@@ -240,7 +240,7 @@ impl Race {
         let halves = |edge: i64| 2 * edge + 1;
         Race {
             what: Conflict::StrobeAtShift,
-            after: Origin::ClkFalls,
+            after: RaceOrigin::ClkFalls,
             comes: strobe,
             from: change - hold,
             to: Some(change + setup),
@@ -262,7 +262,7 @@ impl Race {
         let band = (blocks.0 - within.1, blocks.1 - within.0);
         Race {
             what: Conflict::CutPulse,
-            after: Origin::ClkFalls,
+            after: RaceOrigin::ClkFalls,
             comes: block,
             from: pulse + within.0,
             to: Some(pulse + within.1),
@@ -286,7 +286,7 @@ impl Race {
     pub(crate) fn short_reset(need: Time, width: Time) -> Self {
         Race {
             what: Conflict::ShortReset,
-            after: Origin::ResetRises,
+            after: RaceOrigin::ResetRises,
             comes: need,
             from: width,
             to: None,
@@ -298,7 +298,7 @@ impl Race {
     pub(crate) fn long_load(pulse: Time, period: Time) -> Self {
         Race {
             what: Conflict::InitAtLoadPulse,
-            after: Origin::LoadClkFalls,
+            after: RaceOrigin::LoadClkFalls,
             comes: pulse,
             from: Time::from_fs(period.as_fs() / 2),
             to: None,
@@ -317,7 +317,7 @@ impl Race {
         let within = |p: &Time| p.as_fs().abs() <= period.as_fs() / 2;
         Race {
             what,
-            after: Origin::StopRises,
+            after: RaceOrigin::StopRises,
             comes,
             from,
             to: Some(to),
@@ -332,7 +332,7 @@ impl Race {
     pub(crate) fn too_slow(what: Conflict, comes: Time, until: Time) -> Self {
         Race {
             what,
-            after: Origin::ClkEdge,
+            after: RaceOrigin::ClkEdge,
             comes,
             from: until,
             to: None,

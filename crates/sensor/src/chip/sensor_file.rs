@@ -52,7 +52,7 @@ pub enum SensorFault {
         /// What is asked for.
         threshold: u8,
         /// What is counted.
-        lines: Lines,
+        lines: CorrelationLines,
         /// The largest that there are bits for.
         most: u32,
     },
@@ -129,14 +129,14 @@ pub enum SensorFault {
 
 /// What the correlation block of a sensor counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Lines {
+pub struct CorrelationLines {
     /// Its front end.
     pub front_end: FrontEnd,
     /// Lines of SPAD_TIMED.
     pub count: usize,
 }
 
-impl fmt::Display for Lines {
+impl fmt::Display for CorrelationLines {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.front_end.joins(), self.count) {
             (true, _) => write!(f, "the one line of front_end = {:?}", self.front_end.name()),
@@ -154,7 +154,7 @@ pub struct NeverMet {
     /// THRESHOLD.
     pub threshold: u8,
     /// What is counted.
-    pub lines: Lines,
+    pub lines: CorrelationLines,
 }
 
 impl NeverMet {
@@ -247,7 +247,7 @@ impl SensorConfig {
             *file = library_setting(files.map(|file| placed(&document.folder, &file)));
         }
         // A library that cannot be read is complained of below.
-        let library = CellLibrary::of(&config).ok();
+        let library = CellLibrary::from_config(&config).ok();
         let library = library.and_then(CellLibrary::from_file);
         let library = library.map(|read| &read.liberty);
         for contract in &CONTRACTS {
@@ -342,7 +342,7 @@ impl SensorConfig {
         }
         let most = (1 << self.threshold_bits()) - 1;
         let (threshold, event_type) = (self.threshold, self.event_type);
-        let lines = Lines {
+        let lines = CorrelationLines {
             front_end: self.front_end,
             count: self.lines(),
         };
@@ -377,13 +377,13 @@ impl SensorConfig {
                 SensorFault::Value { key, why }
             })?;
         }
-        let library =
-            CellLibrary::of(self).map_err(|(key, why)| SensorFault::Liberty { key, why })?;
+        let library = CellLibrary::from_config(self)
+            .map_err(|(key, why)| SensorFault::Liberty { key, why })?;
         Silicon::at_temperature(library, self).map_err(|why| SensorFault::Liberty {
             key: "temperature_c",
             why: why.to_string(),
         })?;
-        ChipTiming::of(self).pulses.follow(self)?;
+        ChipTiming::new(self).pulses.follow(self)?;
         let half_period_ps = 0.5e12 / self.clk_hz;
         if self.stop_phase_ps.is_nan() || self.stop_phase_ps.abs() > half_period_ps {
             return Err(SensorFault::StopPhase {

@@ -36,7 +36,7 @@ use super::bins::Bins;
 use super::config::{AfterBorrow, Mode, Tdc};
 use super::exposure::Exposure;
 use super::p_counter::{Rises, starts_high};
-use super::race::{Conflict, Cure, Irregular, NoAim, Origin, Race};
+use super::race::{Conflict, Cure, Irregular, NoAim, Race, RaceOrigin};
 use super::sensors::Sensor;
 use super::timing::macropixel::spread;
 use super::timing::{ChipTiming, LocalStopDelays};
@@ -49,7 +49,7 @@ const ROUNDING: Time = Time::from_fs(2);
 
 /// What becomes of a start value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Window {
+pub enum WindowOutcome {
     /// The histogram is latched once in every laser cycle.
     Open(OpenWindow),
     /// LOCAL_STOP does not come within the laser cycle: nothing is ever counted.
@@ -62,25 +62,25 @@ pub enum Window {
     Race(Race),
 }
 
-impl Window {
+impl WindowOutcome {
     /// The open window, or `None` where it never opens.
     ///
     /// # Errors
     /// What keeps the law from telling.
     pub fn settled(self) -> Result<Option<OpenWindow>, NoAim> {
         match self {
-            Window::Open(window) => Ok(Some(window)),
-            Window::Never => Ok(None),
-            Window::Irregular(why) => Err(NoAim::Irregular(why)),
-            Window::Race(race) => Err(NoAim::Race(race)),
+            WindowOutcome::Open(window) => Ok(Some(window)),
+            WindowOutcome::Never => Ok(None),
+            WindowOutcome::Irregular(why) => Err(NoAim::Irregular(why)),
+            WindowOutcome::Race(race) => Err(NoAim::Race(race)),
         }
     }
 
     /// The open window, if it is one.
     pub fn open(self) -> Option<OpenWindow> {
         match self {
-            Window::Open(window) => Some(window),
-            Window::Never | Window::Irregular(_) | Window::Race(_) => None,
+            WindowOutcome::Open(window) => Some(window),
+            WindowOutcome::Never | WindowOutcome::Irregular(_) | WindowOutcome::Race(_) => None,
         }
     }
 }
@@ -204,7 +204,7 @@ impl WindowLaw {
     }
 
     /// Where the window of a start value lies.
-    pub fn window(&self, start: u16) -> Window {
+    pub fn window(&self, start: u16) -> WindowOutcome {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let end = exposure.clock.periods(exposure.stop_periods as i64);
         let period = exposure.clock.period();
@@ -218,23 +218,23 @@ impl WindowLaw {
             } else {
                 Conflict::SlowCorrelation
             };
-            return Window::Race(Race::too_slow(what, to_shift, period));
+            return WindowOutcome::Race(Race::too_slow(what, to_shift, period));
         }
         if let Some(need) = timing.broken_hold {
-            return Window::Race(Race::broken_hold(need));
+            return WindowOutcome::Race(Race::broken_hold(need));
         }
         if period < timing.clk_period {
             let race = Race::too_slow(Conflict::SlowPath, timing.clk_period, period);
-            return Window::Race(race);
+            return WindowOutcome::Race(race);
         }
         if let (Mode::Guided, Some(why)) = (self.sensor.mode, self.miscount(start)) {
-            return Window::Irregular(why);
+            return WindowOutcome::Irregular(why);
         }
         let (cause, arrival, count_edge, irregular) = match self.sensor.mode {
             // A laser cycle is counted by the STOP edge that ends it.
             Mode::Conventional => {
                 if let Some(race) = self.strobe_of_stop() {
-                    return Window::Race(race);
+                    return WindowOutcome::Race(race);
                 }
                 (end, end + timing.stop_to_strobe, 0, None)
             }
@@ -255,7 +255,9 @@ impl WindowLaw {
                         let irregular = unknown.or(irregular);
                         (time, time + timing.local_stop_to_strobe, edge, irregular)
                     }
-                    Err(Window::Never) => return unknown.map_or(Window::Never, Window::Irregular),
+                    Err(WindowOutcome::Never) => {
+                        return unknown.map_or(WindowOutcome::Never, WindowOutcome::Irregular);
+                    }
                     Err(window) => return window,
                 }
             }
@@ -273,12 +275,12 @@ impl WindowLaw {
             } else {
                 arrival + before
             };
-            return Window::Race(self.strobe_race(start, (cause, arrival), change));
+            return WindowOutcome::Race(self.strobe_race(start, (cause, arrival), change));
         }
         if let Some(why) = irregular.or(self.sensor.lawless_block().map(Irregular::OwnBlock)) {
-            return Window::Irregular(why);
+            return WindowOutcome::Irregular(why);
         }
-        Window::Open(OpenWindow {
+        WindowOutcome::Open(OpenWindow {
             start,
             first_edge: last - self.bins,
             strobe_cause: cause,
@@ -294,7 +296,7 @@ impl WindowLaw {
         (cause, arrival): (Time, Time),
         count_edge: i64,
         irregular: Option<Irregular>,
-    ) -> Window {
+    ) -> WindowOutcome {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let (setup, hold) = (timing.setup + ROUNDING, timing.hold + ROUNDING);
         let (period, phase) = (exposure.clock.period(), exposure.stop_phase);
@@ -311,7 +313,7 @@ impl WindowLaw {
             let comes = exposure.rising(if held < set_up { edge } else { low });
             let forbidden = (falls - hold, falls + setup);
             let what = Conflict::StartFallsAtClk;
-            return Window::Race(Race::with_stop(what, comes, forbidden, phase, period));
+            return WindowOutcome::Race(Race::with_stop(what, comes, forbidden, phase, period));
         }
         let rises = arrival + timing.strobe_to_hit;
         let (last, held, set_up) = slacks(rises);
@@ -328,7 +330,7 @@ impl WindowLaw {
             let all = (starts, self.shortest_period());
             let race = Race::strobe_at_shift(period, edge - fall, signals, limits, all);
             let what = Conflict::StartAtClk;
-            return Window::Race(Race { what, ..race });
+            return WindowOutcome::Race(Race { what, ..race });
         }
         let periods = i64::from(exposure.stop_periods);
         let of_counter = if last < low {
@@ -338,9 +340,9 @@ impl WindowLaw {
         };
         let of_block = self.sensor.lawless_block().map(Irregular::OwnBlock);
         if let Some(why) = irregular.or(of_block).or(of_counter) {
-            return Window::Irregular(why);
+            return WindowOutcome::Irregular(why);
         }
-        Window::Open(OpenWindow {
+        WindowOutcome::Open(OpenWindow {
             start,
             first_edge: last + 1,
             strobe_cause: cause,

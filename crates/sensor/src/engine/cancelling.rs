@@ -26,7 +26,11 @@ pub struct Cancelling {
 impl Cancelling {
     /// `None` where the dead time keeps the pulses of a SPAD farther apart than CLK edges; `law` is not asked for then. Nor is
     /// anything told of bins that are not CLK periods, of SPADs that share a wire, and of a front end or METDC of one's own.
-    pub fn of(dead_time: Time, clock: Frequency, law: impl FnOnce() -> WindowLaw) -> Option<Self> {
+    pub fn from_law(
+        dead_time: Time,
+        clock: Frequency,
+        law: impl FnOnce() -> WindowLaw,
+    ) -> Option<Self> {
         let law = (dead_time <= clock.period()).then(law)?;
         let sensor = law.sensor();
         let is_built_in = sensor.front_end_block.is_none() && sensor.metdc_block.is_none();
@@ -52,14 +56,14 @@ impl Cancelling {
 
     /// How many of a macropixel's pulses cancel in the windows of this start value: two to a pair. All count where no
     /// single window says which matter.
-    pub(crate) fn seen(&self, start: u16, pulses: &[SpadEvent]) -> u64 {
+    pub(crate) fn cancelled_pulses(&self, start: u16, pulses: &[SpadEvent]) -> u64 {
         let window = self.law.window(start);
         let is_seen = |edge: i64| match &window {
-            window_law::Window::Open(window) => {
+            window_law::WindowOutcome::Open(window) => {
                 self.law.bins_of_edge(window, edge).next().is_some()
             }
-            window_law::Window::Never => false,
-            window_law::Window::Irregular(_) | window_law::Window::Race(_) => true,
+            window_law::WindowOutcome::Never => false,
+            window_law::WindowOutcome::Irregular(_) | window_law::WindowOutcome::Race(_) => true,
         };
         2 * self
             .pairs(pulses)
@@ -74,7 +78,7 @@ pub fn cancelled<R: Replay + ?Sized>(
     config: &SensorConfig,
     pixels: &[PulsedPixel<'_>],
 ) -> u64 {
-    let cancelling = Cancelling::of(config.pulse_width(), config.clock(), || engine.law());
+    let cancelling = Cancelling::from_law(config.pulse_width(), config.clock(), || engine.law());
     let Some(cancelling) = cancelling else {
         return 0;
     };

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::chip::Irregular;
 use crate::chip::front_end::{DeadTimeTooShort, PulseLimits};
 use crate::chip::race::NoAim;
-use crate::chip::window_law::Window;
+use crate::chip::window_law::WindowOutcome;
 use crate::chip::{FrontEnd, Race, Sensor, Tdc, WindowLaw};
 use crate::units::Time;
 
@@ -205,7 +205,7 @@ pub(super) fn refuse_races(
     let mut racing: BTreeMap<u16, Race> = BTreeMap::new();
     let mut known: BTreeSet<u16> = BTreeSet::new();
     for start in starts.filter(|&start| known.insert(start)) {
-        if let Window::Race(race) = law.window(start) {
+        if let WindowOutcome::Race(race) = law.window(start) {
             racing.insert(start, race);
             if !race.what.depends_on_start() {
                 break;

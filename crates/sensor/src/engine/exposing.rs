@@ -9,7 +9,8 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::{
-    Cancelling, Engine, EngineError, Expose, Exposed, LitPixel, PulsedPixel, Replay, Work,
+    Cancelling, Engine, EngineError, EngineWork, Expose, ExposureResult, LitPixel, PulsedPixel,
+    Replay,
 };
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::photon::{PhotonStream, PixelLight, PixelPhotons, SpadEvent, StreamConfig};
@@ -67,7 +68,7 @@ pub fn expose<E: Expose + ?Sized, A: Answer>(
     stream: &PhotonStream,
     pixels: &[LitPixel],
     done: impl Fn(usize) -> A + Sync,
-) -> Result<Exposed, EngineError> {
+) -> Result<ExposureResult, EngineError> {
     refuse_blinding(stream, pixels)?;
     in_batches(engine, pixels, done, |batch| engine.expose(stream, batch))
 }
@@ -82,7 +83,7 @@ pub fn expose_without_skipping<E: Replay + ?Sized, A: Answer>(
     stream: &PhotonStream,
     pixels: &[LitPixel],
     done: impl Fn(usize) -> A + Sync,
-) -> Result<Exposed, EngineError> {
+) -> Result<ExposureResult, EngineError> {
     refuse_blinding(stream, pixels)?;
     in_batches(engine, pixels, done, |batch| {
         full_stream(engine, stream, batch)
@@ -168,9 +169,9 @@ fn in_batches<E: Engine + ?Sized, A: Answer>(
     engine: &E,
     pixels: &[LitPixel],
     done: impl Fn(usize) -> A + Sync,
-    expose: impl Fn(&[LitPixel]) -> Result<Exposed, EngineError> + Sync,
-) -> Result<Exposed, EngineError> {
-    let batches: Vec<Exposed> = pixels
+    expose: impl Fn(&[LitPixel]) -> Result<ExposureResult, EngineError> + Sync,
+) -> Result<ExposureResult, EngineError> {
+    let batches: Vec<ExposureResult> = pixels
         .par_chunks(engine.batch())
         .map(|batch| {
             if done(0).stops() {
@@ -184,7 +185,7 @@ fn in_batches<E: Engine + ?Sized, A: Answer>(
             }
         })
         .collect::<Result<_, EngineError>>()?;
-    let mut all = Exposed::new(engine.bins());
+    let mut all = ExposureResult::new(engine.bins());
     for batch in batches {
         all.histograms.append(&batch.histograms);
         all.work += batch.work;
@@ -205,14 +206,14 @@ pub fn full_stream<E: Replay + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
-) -> Result<Exposed, EngineError> {
+) -> Result<ExposureResult, EngineError> {
     let bytes = |pixel: &LitPixel| {
         let light = pixel.light.as_ref();
         let edges = light.map_or(0.0, |light| stream.config().most_edges(light));
         edges * size_of::<SpadEvent>() as f64
     };
     refuse_other_spads(stream, pixels)?;
-    let mut exposed = Exposed::new(engine.bins());
+    let mut exposed = ExposureResult::new(engine.bins());
     let mut rest = pixels;
     while !rest.is_empty() {
         let mut total = 0.0;
@@ -221,7 +222,7 @@ pub fn full_stream<E: Replay + ?Sized>(
             total <= MOST_PULSE_BYTES
         });
         let (now, later) = rest.split_at(fitting.count().max(1));
-        let Exposed { histograms, work } = whole_pixels(engine, stream, now)?;
+        let ExposureResult { histograms, work } = whole_pixels(engine, stream, now)?;
         exposed.histograms.append(&histograms);
         exposed.work += work;
         rest = later;
@@ -233,7 +234,7 @@ fn whole_pixels<E: Replay + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
-) -> Result<Exposed, EngineError> {
+) -> Result<ExposureResult, EngineError> {
     let photons: Vec<PixelPhotons> = pixels
         .iter()
         .map(|pixel| match &pixel.light {
@@ -251,19 +252,19 @@ fn whole_pixels<E: Replay + ?Sized>(
         .collect();
     let histograms = engine.replay(&pulsed)?;
     let config = stream.config();
-    let cancelling = Cancelling::of(config.spads.shortest_dead_time(), config.clock, || {
+    let cancelling = Cancelling::from_law(config.spads.shortest_dead_time(), config.clock, || {
         engine.law()
     });
     let cancelled = cancelling.map_or(0, |cancelling| {
         let seen = |pixel: &PulsedPixel<'_>| {
             let pulses = engine.as_the_law_sees(pixel.number, pixel.pulses);
-            cancelling.seen(pixel.start, &pulses)
+            cancelling.cancelled_pulses(pixel.start, &pulses)
         };
         pulsed.iter().map(seen).sum()
     });
     let clk_periods =
         pixels.len() as u64 * u64::from(config.stop_periods) * u64::from(config.laser_cycles);
-    let work = Work {
+    let work = EngineWork {
         macropixels: pixels.len() as u64,
         photons_drawn: photons.iter().map(|p| p.drawn).sum(),
         pulses: photons.iter().map(|p| p.events.len() as u64).sum(),
@@ -271,7 +272,7 @@ fn whole_pixels<E: Replay + ?Sized>(
         cancelled,
         clk_periods,
         clk_periods_visited: clk_periods,
-        ..Work::default()
+        ..EngineWork::default()
     };
-    Ok(Exposed { histograms, work })
+    Ok(ExposureResult { histograms, work })
 }

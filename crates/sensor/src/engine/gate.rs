@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::lanes::LaneSimulation;
 use super::readout::PinSampler;
 use super::{
-    Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay, follows,
-    full_stream,
+    Engine, EngineError, Expose, ExposureResult, Histograms, LitPixel, PulsedPixel, Replay,
+    follows, full_stream,
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
@@ -159,7 +159,7 @@ impl GateSimulation {
 
     /// Simulates from power-up to `until`.
     pub(super) fn run_until(&mut self, until: Time, observer: &mut dyn Observer) {
-        let pins = SensorPins::of(&self.netlist);
+        let pins = SensorPins::find(&self.netlist);
         let mut stimulus = self.plan.stimulus(&pins);
         if let Some((rest, states)) = self.preset.take() {
             self.kernel
@@ -193,14 +193,14 @@ impl GateSimulation {
             Some(stream) => {
                 let clock = self.sensor.load_clock();
                 let times = (now, now + clock.period());
-                reload_stimulus(LoadPins::of(&self.netlist), clock, times, stream)
+                reload_stimulus(LoadPins::find(&self.netlist), clock, times, stream)
             }
         };
         let order = self.plan.order;
-        let pins = ReadPins::of(&self.netlist);
+        let pins = ReadPins::find(&self.netlist);
         let (clock, start) = (self.sensor.read_clock(), self.kernel.now());
         let (end, read) = read_stimulus(&pins, clock, start, order.periods());
-        let mut stimulus = read.with(others);
+        let mut stimulus = read.with_drives(others);
         let mut sampler = PinSampler::new(&self.netlist, |net| self.kernel.value(net));
         let mut observers = (&mut sampler, observer);
         let settled = end.max(others_end) + clock.period();
@@ -355,7 +355,11 @@ impl Replay for Gate {
 }
 
 impl Expose for Gate {
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError> {
         full_stream(self, stream, pixels)
     }
 }

@@ -83,7 +83,7 @@ impl LaneSimulation {
 
     /// Simulates from power-up to `end`, in simulation time.
     pub(super) fn run_until<O: LaneObserver>(&mut self, end: Time, observer: &mut O) {
-        let pins = SensorPins::of(&self.netlist);
+        let pins = SensorPins::find(&self.netlist);
         let mut stimulus = self.stimulus(&pins).peekable();
         self.kernel
             .run(&mut stimulus, end, observer)
@@ -108,7 +108,7 @@ impl LaneSimulation {
             } else {
                 let bits = self.serial.iter().enumerate();
                 let word = bits.fold(0, |word, (lane, bits)| word | u64::from(bits[bit]) << lane);
-                drives.push(everyone(drive.time, serial, Lanes::known(word)));
+                drives.push(everyone(drive.time, serial, Lanes::from_bits(word)));
                 bit += 1;
             }
         }
@@ -117,7 +117,7 @@ impl LaneSimulation {
             let net = pins.spad_raw[usize::from(pulse.spad)];
             let time = origin + pulse.time;
             let mask = 1 << lane;
-            let (rise, fall) = (Lanes::known(u64::MAX), Lanes::known(0));
+            let (rise, fall) = (Lanes::from_bits(u64::MAX), Lanes::from_bits(0));
             drives.push(LaneDrive {
                 time,
                 net,

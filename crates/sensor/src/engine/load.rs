@@ -28,8 +28,8 @@ pub fn load(
     debug_assert_eq!(starts.len(), config.pixels());
     let codes = config.load_codes(starts);
     let stream = load_path::stream(&codes, config.cols, config.counter_bits);
-    let (end, mut stimulus) = load_stimulus(LoadPins::of(netlist), config.load_clock(), &stream);
-    let timing = Silicon::of(config).timing(netlist);
+    let (end, mut stimulus) = load_stimulus(LoadPins::find(netlist), config.load_clock(), &stream);
+    let timing = Silicon::new(config).timing(netlist);
     let mut kernel = Kernel::new(netlist, &timing);
     let settled = end + config.load_clock().periods(1);
     kernel

@@ -10,7 +10,7 @@
 //!
 //! All but `Cohort` take the same start value and SPAD pulses ([`Replay`]) and, with the same delays, give the same histogram. `Cycle` and `Window` assume what
 //! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
-//! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them. `Window`
+//! plain-Rust reference model ([`crate::chip::macropixel::MacropixelModel`]) is the tests' slow judge of all of them. `Window`
 //! also refuses a P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
 mod cancelling;
@@ -31,7 +31,7 @@ mod window;
 
 pub use cancelling::{Cancelling, cancelled};
 pub use cohort::{Cohort, CohortOptions, variance_left_out};
-pub use cycle::{Cycle, PackedPulses, Unlevelled};
+pub use cycle::{Cycle, LevelisationError, PackedPulses};
 pub use error::{EngineError, NotModelled};
 pub use exposing::{
     Answer, expose, expose_without_skipping, full_stream, refuse_floods, stream_config,
@@ -41,7 +41,7 @@ pub use histograms::Histograms;
 pub use lanes::LaneSimulation;
 pub use late_cycle::late_cycle;
 pub use timed::{ClosedFormCoverage, Doubt, Runner, Timed};
-pub use traits::{Engine, Expose, Exposed, LitPixel, PulsedPixel, Replay, Work};
+pub use traits::{Engine, EngineWork, Expose, ExposureResult, LitPixel, PulsedPixel, Replay};
 pub use window::Window;
 
 use error::{follows, has_a_line_a_spad};

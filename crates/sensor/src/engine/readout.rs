@@ -26,7 +26,7 @@ pub struct PinSampler {
 impl PinSampler {
     /// Nothing sampled yet; the pins have the values that `value` tells.
     pub fn new(netlist: &Netlist, value: impl Fn(NetId) -> Logic) -> Self {
-        let pins = ReadPins::of(netlist);
+        let pins = ReadPins::find(netlist);
         let mut pin = vec![0; netlist.net_count()];
         for (index, net) in pins.data.iter().enumerate() {
             pin[net.index()] = index as u16 + 1;
@@ -94,7 +94,7 @@ pub(crate) const READ_ENABLED: Time = Time::from_ns(20);
 /// Drives that put `counts` (macropixels row-major, bin 0 first) behind a readout, and bring it out of reset.
 pub(crate) fn power_up(netlist: &Netlist, order: &ReadoutOrder, counts: &[u16]) -> Vec<Drive> {
     debug_assert_eq!(counts.len(), order.rows * order.cols * order.bins);
-    let (pins, resetb) = (ReadPins::of(netlist), ReadProbe::ResetB.net(netlist));
+    let (pins, resetb) = (ReadPins::find(netlist), ReadProbe::ResetB.net(netlist));
     let bits = counts
         .iter()
         .flat_map(|count| (0..order.bits).map(move |bit| count >> bit & 1 == 1));
@@ -121,11 +121,11 @@ pub fn read_out(
     counts: &[u16],
     observer: &mut dyn Observer,
 ) -> Readout {
-    let order = ReadoutOrder::of(config);
-    let pins = ReadPins::of(netlist);
+    let order = ReadoutOrder::new(config);
+    let pins = ReadPins::find(netlist);
     let (end, read) = read_stimulus(&pins, config.read_clock(), READ_ENABLED, order.periods());
-    let mut stimulus = Stimulus::sorted(power_up(netlist, &order, counts)).with(read);
-    let mut kernel = Kernel::new(netlist, &Silicon::of(config).timing(netlist));
+    let mut stimulus = Stimulus::sorted(power_up(netlist, &order, counts)).with_drives(read);
+    let mut kernel = Kernel::new(netlist, &Silicon::new(config).timing(netlist));
     let mut sampler = PinSampler::new(netlist, |_| Logic::X);
     kernel
         .run(&mut stimulus, end, &mut (&mut sampler, observer))
@@ -139,7 +139,7 @@ pub fn read_out(
 
 /// The readout of this sensor with pins for counts in place of its macropixels, elaborated.
 pub fn readout_netlist(config: &SensorConfig) -> Netlist {
-    Netlist::elaborate(&with_counts(ReadoutOrder::of(config)))
+    Netlist::elaborate(&with_counts(ReadoutOrder::new(config)))
 }
 
 /// A sensor's pins with nothing but memories and counts behind them, elaborated once for all clocks.
@@ -166,7 +166,7 @@ pub struct PinTimes {
 
 impl PinNetlists {
     /// Those of this sensor.
-    pub fn of(config: &SensorConfig) -> Self {
+    pub fn new(config: &SensorConfig) -> Self {
         PinNetlists {
             load: load_netlist(config),
             read: readout_netlist(config),

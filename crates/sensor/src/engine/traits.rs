@@ -108,19 +108,19 @@ pub struct LitPixel {
 
 /// Histograms, and what they took.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Exposed {
+pub struct ExposureResult {
     /// Counts of every macropixel and bin.
     pub histograms: Histograms,
     /// What was simulated.
-    pub work: Work,
+    pub work: EngineWork,
 }
 
-impl Exposed {
+impl ExposureResult {
     /// Of no macropixel.
     pub(crate) fn new(bins: usize) -> Self {
-        Exposed {
+        ExposureResult {
             histograms: Histograms::new(bins),
-            work: Work::default(),
+            work: EngineWork::default(),
         }
     }
 }
@@ -133,7 +133,11 @@ pub trait Expose: Engine {
     ///
     /// # Errors
     /// When this engine cannot tell what the circuit does in this light.
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError>;
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError>;
 }
 
 // A macropixel's pulses by its own CLK.
@@ -163,7 +167,7 @@ pub(super) fn by_own_clk<'p>(
 
 /// What an engine did, and what it had no need to do. Sums over macropixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Work {
+pub struct EngineWork {
     /// Macropixels asked for.
     pub macropixels: u64,
     /// Those not simulated because their SPADs are switched off.
@@ -184,7 +188,7 @@ pub struct Work {
     pub clk_periods_visited: u64,
 }
 
-impl AddAssign for Work {
+impl AddAssign for EngineWork {
     fn add_assign(&mut self, other: Self) {
         self.macropixels += other.macropixels;
         self.skipped_dark += other.skipped_dark;

@@ -15,7 +15,9 @@ use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
 use crate::photon::SpadEvent;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout, Mark, Selection, WaveFile, WaveFormat, write_views};
+use crate::waves::{
+    Entry, Layout, Mark, SignalGroup, WaveFile, WaveFormat, WaveSelection, write_views,
+};
 
 /// CLK periods that a view shows before its marker, and after: the end of a window, and what becomes of it.
 const SHOWN_PERIODS: (i64, i64) = (18, 4);
@@ -50,14 +52,14 @@ impl WaveCycles {
         start: u16,
         pulses: &[SpadEvent],
     ) -> u32 {
-        let (_, until) = self.around(config, exposure, start, pulses);
+        let (_, until) = self.kept_cycles(config, exposure, start, pulses);
         let wanted = LEAST_SIMULATED.max(until + 1);
         wanted.min(exposure.laser_cycles.into()) as u32
     }
 
     /// Laser cycles of which the waveform of one macropixel is kept; it has everything from power-up if the first of
     /// them is not after the exposure's first.
-    fn around(
+    fn kept_cycles(
         self,
         config: &SensorConfig,
         exposure: &Exposure,
@@ -189,7 +191,7 @@ impl View {
         pulses: &[SpadEvent],
         cycles: WaveCycles,
     ) -> Self {
-        let (from, until) = cycles.around(config, exposure, start, pulses);
+        let (from, until) = cycles.kept_cycles(config, exposure, start, pulses);
         View {
             kept: stop(exposure, from)..=stop(exposure, until),
             ..Self::of_array(vec![pixel], config, exposure, start)
@@ -237,17 +239,17 @@ pub fn record(
 ) -> Result<(), InputError> {
     let schedule = simulation.schedule();
     let origin = schedule.origin;
-    let at = |time: Time| match time {
+    let waveform_time = |time: Time| match time {
         Time::MAX => schedule.end,
         time => (origin + time).min(schedule.end),
     };
     let span = match *view.kept.start() {
-        from if from > Time::ZERO => at(from)..=at(*view.kept.end()),
-        _ => Time::ZERO..=at(*view.kept.end()),
+        from if from > Time::ZERO => waveform_time(from)..=waveform_time(*view.kept.end()),
+        _ => Time::ZERO..=waveform_time(*view.kept.end()),
     };
     let netlist = Arc::clone(simulation.netlist());
     let mut first_hit = FirstHit::new(&netlist, &view.pixels, origin.max(*span.start()));
-    let mut file = WaveFile::create(waves, format, &netlist, &Selection::all(), span.clone())?;
+    let mut file = WaveFile::create(waves, format, &netlist, &WaveSelection::all(), span.clone())?;
     let end = if view.is_part {
         *span.end()
     } else {
@@ -322,8 +324,8 @@ pub fn write_waves(
     run: impl FnOnce(&mut WaveFile) -> Time,
 ) -> Result<(), InputError> {
     let all = Time::ZERO..=Time::MAX;
-    let format = WaveFormat::of(waves);
-    let mut file = WaveFile::create(waves, format, netlist, &Selection::all(), all)?;
+    let format = WaveFormat::from_path(waves);
+    let mut file = WaveFile::create(waves, format, netlist, &WaveSelection::all(), all)?;
     let end = run(&mut file);
     file.finish(end)?;
     write_views(layout, waves, netlist, end)
@@ -335,7 +337,7 @@ pub fn hits(path: impl Into<String>, bins: usize) -> Entry {
 }
 
 /// The signals of the macropixel (row, col), and the load path.
-fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
+fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<SignalGroup> {
     let probes = Probes::of_macropixel(netlist, row, col);
     let binary = |probe| Entry::binary(probes.path(probe));
     let decimal = |probe| Entry::decimal(probes.path(probe));
@@ -389,11 +391,11 @@ fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
     ];
     let pixel = probes.macropixel();
     vec![
-        Group::new(
+        SignalGroup::new(
             format!("P-counter {pixel} (Fig. 54)"),
             loaded.into_iter().chain(memory).chain(counted),
         ),
-        Group::new(format!("Histogram {pixel} (Fig. 47)"), events.chain(bins)),
-        Group::new("Load path (Fig. 57)", load),
+        SignalGroup::new(format!("Histogram {pixel} (Fig. 47)"), events.chain(bins)),
+        SignalGroup::new("Load path (Fig. 57)", load),
     ]
 }

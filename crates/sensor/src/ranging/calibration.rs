@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 /// One zone of one capture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Echo {
+pub struct ZoneEcho {
     /// Zone, from 0.
     pub zone: usize,
     /// Arrival after the reference's arrival, bins.
@@ -62,7 +62,7 @@ impl Calibration {
     ///
     /// # Errors
     /// When a zone has too few echoes to tell its line.
-    pub fn fit(zones: usize, echoes: &[(Echo, f64)]) -> Result<Self, CalibrationError> {
+    pub fn fit(zones: usize, echoes: &[(ZoneEcho, f64)]) -> Result<Self, CalibrationError> {
         let mut covariance = 0.0;
         let mut variance = 0.0;
         let of_zone = |zone| {
@@ -78,12 +78,12 @@ impl Calibration {
             if distinct(&depths) < 3 {
                 return Err(CalibrationError::TooFew(zone));
             }
-            let line = |y: &[f64]| Line::through(&arrivals, y);
+            let line = |y: &[f64]| Line::fit(&arrivals, y);
             let (Some(of_counts), Some(of_depths)) = (line(&counts), line(&depths)) else {
                 return Err(CalibrationError::TooFew(zone));
             };
             for ((&x, &n), &depth) in arrivals.iter().zip(&counts).zip(&depths) {
-                let (n, depth) = (n - of_counts.at(x), depth - of_depths.at(x));
+                let (n, depth) = (n - of_counts.value(x), depth - of_depths.value(x));
                 covariance += n * depth;
                 variance += n * n;
             }
@@ -100,11 +100,10 @@ impl Calibration {
                 .zip(&counts)
                 .map(|(depth, n)| depth - walk_m_per_count * n)
                 .collect();
-            let line =
-                Line::through(&arrivals, &without_walk).ok_or(CalibrationError::TooFew(zone))?;
+            let line = Line::fit(&arrivals, &without_walk).ok_or(CalibrationError::TooFew(zone))?;
             Ok(ZoneCalibration {
                 scale_m: line.slope,
-                offset_m: line.at(0.0),
+                offset_m: line.value(0.0),
             })
         });
         Ok(Calibration {
@@ -114,7 +113,7 @@ impl Calibration {
     }
 
     /// Depth of an echo, m. Its zone must be one of the calibration's.
-    pub fn depth_m(&self, echo: &Echo) -> f64 {
+    pub fn depth_m(&self, echo: &ZoneEcho) -> f64 {
         let zone = &self.zones[echo.zone];
         zone.scale_m * echo.arrival_bins
             + zone.offset_m
@@ -139,7 +138,7 @@ struct Line {
 
 impl Line {
     /// Through at least three points at three different x.
-    fn through(x: &[f64], y: &[f64]) -> Option<Self> {
+    fn fit(x: &[f64], y: &[f64]) -> Option<Self> {
         if distinct(x) < 3 {
             return None;
         }
@@ -157,7 +156,7 @@ impl Line {
         })
     }
 
-    fn at(&self, x: f64) -> f64 {
+    fn value(&self, x: f64) -> f64 {
         self.mean_y + self.slope * (x - self.mean_x)
     }
 }
@@ -167,8 +166,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn echo(zone: usize, arrival_bins: f64, signal_counts: f64) -> Echo {
-        Echo {
+    fn echo(zone: usize, arrival_bins: f64, signal_counts: f64) -> ZoneEcho {
+        ZoneEcho {
             zone,
             arrival_bins,
             signal_counts,
@@ -177,7 +176,7 @@ mod tests {
 
     #[test]
     fn a_zone_that_saw_too_little_is_named() {
-        let echoes: Vec<(Echo, f64)> = (0..5)
+        let echoes: Vec<(ZoneEcho, f64)> = (0..5)
             .flat_map(|i| {
                 let at = f64::from(i);
                 [(echo(0, at, 1.0), 0.1 * at), (echo(1, 2.0, 1.0), 0.1 * at)]
@@ -189,7 +188,7 @@ mod tests {
         );
         assert_eq!(Calibration::fit(1, &[]), Err(CalibrationError::TooFew(0)));
         // Arrivals are noisy where the target stands still.
-        let still: Vec<(Echo, f64)> = (0..5)
+        let still: Vec<(ZoneEcho, f64)> = (0..5)
             .map(|i| (echo(0, 7.0 + 0.01 * f64::from(i), 1.0), 0.5))
             .collect();
         assert_eq!(
@@ -200,16 +199,16 @@ mod tests {
 
     #[test]
     fn three_places_are_a_line() {
-        let at = |i: f64| (echo(0, i, 7.0), 2.0 * i + 1.0);
-        let fitted = Calibration::fit(1, &[at(1.0), at(4.0), at(6.0)]).unwrap();
+        let sample = |i: f64| (echo(0, i, 7.0), 2.0 * i + 1.0);
+        let fitted = Calibration::fit(1, &[sample(1.0), sample(4.0), sample(6.0)]).unwrap();
         assert!((fitted.depth_m(&echo(0, 10.0, 7.0)) - 21.0).abs() < 1e-12);
-        let two = Calibration::fit(1, &[at(1.0), at(4.0), at(4.0)]);
+        let two = Calibration::fit(1, &[sample(1.0), sample(4.0), sample(4.0)]);
         assert_eq!(two, Err(CalibrationError::TooFew(0)));
     }
 
     #[test]
     fn without_a_spread_of_counts_there_is_no_walk() {
-        let echoes: Vec<(Echo, f64)> = (0..5)
+        let echoes: Vec<(ZoneEcho, f64)> = (0..5)
             .map(|i| (echo(0, i as f64, 7.0), 2.0 * i as f64 + 1.0))
             .collect();
         let fitted = Calibration::fit(1, &echoes).unwrap();
@@ -231,7 +230,7 @@ mod tests {
                     .map(|z| ZoneCalibration { scale_m: scale * (1.0 + z as f64), offset_m: offset * z as f64 })
                     .collect(),
             };
-            let echoes: Vec<(Echo, f64)> = counts
+            let echoes: Vec<(ZoneEcho, f64)> = counts
                 .iter()
                 .enumerate()
                 .map(|(i, &n)| echo(i % 3, (i / 3) as f64 * 1.3, n))

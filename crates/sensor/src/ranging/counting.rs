@@ -65,7 +65,7 @@ impl Counting {
                 0.0
             };
             let chance = of_others * (1.0 - clamped) + fewer * clamped;
-            let (holds, slope) = self.given(n, children.value);
+            let (holds, slope) = self.conditional_chance(n, children.value);
             value += chance * holds;
             by_children += chance * slope;
             by_fired += of_all * (fewer - of_others) * holds;
@@ -116,34 +116,35 @@ impl Counting {
 
     /// The chance that a bin counts in which `n` SPADs fired by light, and its slope with `children`.
     #[inline]
-    fn given(&self, n: usize, children: f64) -> (f64, f64) {
+    fn conditional_chance(&self, n: usize, children: f64) -> (f64, f64) {
         if children <= 0.0 || n == 0 {
             return (f64::from(u8::from(self.counts(n))), 0.0);
         }
-        let of = n as i32;
+        let avalanches = n as i32;
         let (mut holds, mut slope) = (0.0, 0.0);
         let mut ways = 1.0;
-        for k in 0..=of {
+        for k in 0..=avalanches {
             if self.counts((n + k as usize).min(self.spads)) {
-                let chance = ways * children.powi(k) * (1.0 - children).powi(of - k);
+                let chance = ways * children.powi(k) * (1.0 - children).powi(avalanches - k);
                 holds += chance;
-                slope += chance * (f64::from(k) / children - f64::from(of - k) / (1.0 - children));
+                slope += chance
+                    * (f64::from(k) / children - f64::from(avalanches - k) / (1.0 - children));
             }
-            ways *= f64::from(of - k) / f64::from(k + 1);
+            ways *= f64::from(avalanches - k) / f64::from(k + 1);
         }
         (holds, slope)
     }
 
     /// The chance of a SPAD to fire at which a bin counts with `chance`, without crosstalk; counts must rise with it.
     pub(super) fn fired_for(&self, chance: f64) -> f64 {
-        let of = |fired: f64| self.chance(Dual::<0>::constant(fired), Dual::ZERO).value;
+        let chance_of = |fired: f64| self.chance(Dual::<0>::constant(fired), Dual::ZERO).value;
         if (self.event_type, self.threshold) == (EventType::Greater, 0) {
             return -libm::expm1(libm::log1p(-chance.min(1.0 - 1e-12)) / self.spads as f64);
         }
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            if of(middle) < chance {
+            if chance_of(middle) < chance {
                 low = middle
             } else {
                 high = middle
@@ -185,17 +186,17 @@ mod tests {
             children in prop_oneof![Just(0.0), 0.001f64..0.5],
         ) {
             let counting = Counting { event_type, threshold, spads: 5 };
-            let of = |fired, children| {
+            let closed_form = |fired, children| {
                 counting.chance(Dual::<2>::parameter(fired, 0), Dual::parameter(children, 1))
             };
-            let chance = of(fired, children);
+            let chance = closed_form(fired, children);
             let expected = by_enumeration(&counting, fired, children);
             prop_assert!((chance.value - expected).abs() < 1e-12, "{} {expected}", chance.value);
             let h = 1e-6;
-            let by_fired = (of(fired + h, children).value - of(fired - h, children).value) / (2.0 * h);
+            let by_fired = (closed_form(fired + h, children).value - closed_form(fired - h, children).value) / (2.0 * h);
             prop_assert!((chance.slope[0] - by_fired).abs() < 1e-6, "{:?} {by_fired}", chance.slope);
             if children > 0.0 {
-                let by_children = (of(fired, children + h).value - of(fired, children - h).value) / (2.0 * h);
+                let by_children = (closed_form(fired, children + h).value - closed_form(fired, children - h).value) / (2.0 * h);
                 prop_assert!((chance.slope[1] - by_children).abs() < 1e-6, "{:?} {by_children}", chance.slope);
             }
             // Nearer to 1 a chance no longer tells how likely one SPAD is.

@@ -37,7 +37,7 @@ const EQUAL: f64 = 1e-6;
 /// Which events of a laser cycle count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Counted {
+pub enum CountedEvents {
     /// All of them.
     Every,
     /// The first one.
@@ -52,7 +52,7 @@ pub struct Coincidence {
     /// How long an output is high after the last photon of its SPAD, s.
     pub within_s: f64,
     /// SPADs on which the light comes evenly.
-    pub of: u32,
+    pub lit_spads: u32,
 }
 
 /// What counts photons, and the laser pulses that it sees.
@@ -63,7 +63,7 @@ pub struct Detector {
     /// Standard deviation of the laser pulse with all jitter, s.
     pub pulse_sigma_s: f64,
     /// Which events count.
-    pub counted: Counted,
+    pub counted: CountedEvents,
     /// Laser cycles of a histogram. It may be unknown where every photon counts.
     pub laser_cycles: Option<u32>,
     /// What an event is, if it is not a photon.
@@ -178,7 +178,7 @@ impl Detector {
     /// More counts than the detector can have.
     pub fn check(&self, counts: &[u32]) -> Result<(), TooManyCounts> {
         let all: u64 = counts.iter().map(|&n| u64::from(n)).sum();
-        if self.counted == Counted::First
+        if self.counted == CountedEvents::First
             && let Some(laser_cycles) = self.laser_cycles
             && all > u64::from(laser_cycles)
         {
@@ -212,7 +212,7 @@ impl Detector {
         let bin_s = self.bin_s();
         let law = self.law(all_parts);
         let response = self.response(&law);
-        let dark = (self.counted == Counted::First || self.has_unlike_bins())
+        let dark = (self.counted == CountedEvents::First || self.has_unlike_bins())
             .then(|| dark_counts(&law, &response, counts, all_parts));
         let finder =
             EchoFinder::of_response(response, bin_s, (all_parts, self.most_counts), options);
@@ -304,9 +304,9 @@ impl Detector {
             together: self.coincidence.map(|coincidence| FiringTogether {
                 least: coincidence.spads,
                 within_bins: coincidence.within_s / bin_s,
-                of_spads: coincidence.of,
+                of_spads: coincidence.lit_spads,
             }),
-            first_only: self.counted == Counted::First,
+            first_only: self.counted == CountedEvents::First,
             parts: f64::from(all_parts) / cycles,
         }
     }

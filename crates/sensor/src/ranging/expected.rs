@@ -307,7 +307,7 @@ impl Response {
         let before = (-begin_bin).max(0.0) as usize;
         let bins = self.bins + before - unlit;
         let dead = self.dead.time_bins;
-        let steps = plain::Steps::of(begin_bin, bins, &pulses, most_steps, dead);
+        let steps = plain::PlainSteps::for_pulses(begin_bin, bins, &pulses, most_steps, dead);
         let mut of_bins =
             background.map(|background| smallvec![plain::steady(background, dead); unlit]);
         plain::fired_by_each(&pulses, &background, &steps, &mut of_bins);
@@ -367,7 +367,7 @@ impl Response {
         let unlit = begin_bin.max(0.0) as usize;
         let before = (-begin_bin).max(0.0) as usize;
         let bins = self.bins + before - unlit;
-        let steps = plain::Steps::of(begin_bin, bins, &[pulse], steps, dead);
+        let steps = plain::PlainSteps::for_pulses(begin_bin, bins, &[pulse], steps, dead);
         let mut of_bins = smallvec![plain::steady(background, dead); unlit];
         plain::fired(&pulse, background, &steps, &mut of_bins);
         self.as_chances(before, &mut of_bins);

@@ -16,8 +16,8 @@ use std::ops::Range;
 
 use super::expected::{EchoLight, Response};
 use super::peak::{Peak, PeakOptions, interpolate_at, median};
-use super::returns::{Found, Others, Return, Search};
-use super::walk::{Corrected, WalkCorrection, WalkLeft};
+use super::returns::{CountStretch, Others, Search, WindowReturn};
+use super::walk::{CorrectedPeak, WalkCorrection, WalkLeft};
 use crate::chip::{Overflow, Tdc, WindowLaw};
 use crate::photon::EchoWidth;
 use crate::theory::significance::{Scan, Stretch};
@@ -237,7 +237,7 @@ impl EchoFinder {
             Err(left) => Err(*left),
         });
         let (fitted, others) = if corrects {
-            self.beside(&real, &peak, whole, share)
+            self.first_echo_and_others(&real, &peak, whole, share)
         } else {
             (whole, Others::default())
         };
@@ -282,13 +282,13 @@ impl EchoFinder {
 
     /// The first echo's light, from its own bins where there are others, and those others. `whole` is what all bins together say of it, and
     /// `share` that of each bin in light that comes at any time alike.
-    fn beside(
+    fn first_echo_and_others(
         &self,
         counts: &[f64],
         peak: &Peak,
-        whole: Option<Result<Corrected, WalkLeft>>,
+        whole: Option<Result<CorrectedPeak, WalkLeft>>,
         share: &dyn Fn(usize) -> f64,
-    ) -> (Option<Result<Corrected, WalkLeft>>, Others) {
+    ) -> (Option<Result<CorrectedPeak, WalkLeft>>, Others) {
         let walk = self.walk_correction();
         let light = whole.and_then(Result::ok).map(|c| c.light);
         let flat = |per_bin: f64| (0..counts.len()).map(|bin| per_bin * share(bin)).collect();
@@ -300,7 +300,7 @@ impl EchoFinder {
             ln_false_alarm: self.ln_false_alarm,
         };
         let own = search.extent(peak.peak_bin);
-        search.take(own.clone());
+        search.mark_bins(own.clone());
         if let (Some(walk), Some(light)) = (walk, light) {
             let cycles = f64::from(walk.laser_cycles);
             let chances = walk.response.chances(&light);
@@ -308,7 +308,7 @@ impl EchoFinder {
             let half = 3.0 * light.sigma_bins + 0.5;
             let ends =
                 [-half, half].map(|off| (light.position_bins + off).round().max(0.0) as usize);
-            search.take(ends[0]..ends[1] + 1);
+            search.mark_bins(ends[0]..ends[1] + 1);
         } else {
             let outside = counts
                 .iter()
@@ -317,7 +317,7 @@ impl EchoFinder {
             search.expected = flat(median(outside.map(|(counts, _)| counts)));
         }
         let mut others = Others::default();
-        let mut founds: Vec<Found> = Vec::new();
+        let mut founds: Vec<CountStretch> = Vec::new();
         while founds.len() < others.len()
             && let Some(found) = search.next()
         {
@@ -346,9 +346,14 @@ impl EchoFinder {
     }
 
     /// A further echo, fitted where its counts are those of one.
-    fn as_return(&self, search: &Search<'_>, found: &Found, is_explained: bool) -> Return {
+    fn as_return(
+        &self,
+        search: &Search<'_>,
+        found: &CountStretch,
+        is_explained: bool,
+    ) -> WindowReturn {
         let walk = self.walk_correction();
-        let Found {
+        let CountStretch {
             bins,
             peak_bin,
             confidence,
@@ -373,7 +378,7 @@ impl EchoFinder {
             fitted.ok()
         });
         let mean = sum / f64::from(self.scan.laser_cycles);
-        Return {
+        WindowReturn {
             position_bins: fitted.map_or(centre.position_bins, |c| c.light.position_bins),
             bound_bins: fitted.map(|c| self.bound_bins(&c)),
             photons: fitted.map_or(mean, |c| c.light.signal),
@@ -394,7 +399,7 @@ impl EchoFinder {
     }
 
     /// Whether the window ends within an echo: its width is a guess then.
-    fn is_cut(&self, corrected: &Corrected, counts: &[f64], peak_bin: usize) -> bool {
+    fn is_cut(&self, corrected: &CorrectedPeak, counts: &[f64], peak_bin: usize) -> bool {
         let last = counts.len() - 1;
         let cycles = f64::from(self.scan.laser_cycles);
         let walk = self.walk_correction();
@@ -409,7 +414,7 @@ impl EchoFinder {
     }
 
     /// What is said of an echo's place: the least that its counts allow, and what its unknown shape and unequal dead times add.
-    fn bound_bins(&self, corrected: &Corrected) -> f64 {
+    fn bound_bins(&self, corrected: &CorrectedPeak) -> f64 {
         let Some(walk) = self.walk_correction() else {
             return corrected.bound_bins;
         };
@@ -424,7 +429,7 @@ impl EchoFinder {
     }
 
     /// Whether an echo is so strong that its counts do not tell its place.
-    fn is_lost(&self, corrected: &Corrected) -> bool {
+    fn is_lost(&self, corrected: &CorrectedPeak) -> bool {
         let Some(walk) = self.walk_correction() else {
             return false;
         };

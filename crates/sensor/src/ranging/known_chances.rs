@@ -20,7 +20,7 @@ const MOST_KEPT: usize = 16;
 const MOST_BINS: usize = 16;
 
 /// The mean histogram of a light.
-struct Known {
+struct MeanHistogram {
     response: Response,
     light: EchoLight,
     steps: usize,
@@ -30,7 +30,7 @@ struct Known {
 /// In a ring, whose oldest is the next to be overwritten.
 #[derive(Default)]
 struct Ring {
-    known: Vec<Known>,
+    known: Vec<MeanHistogram>,
     oldest: usize,
 }
 
@@ -45,7 +45,7 @@ pub(super) fn find<const K: usize>(
     steps: usize,
 ) -> Option<OfBins<K>> {
     RING.with_borrow(|ring| {
-        let is_same = |known: &&Known| {
+        let is_same = |known: &&MeanHistogram| {
             known.light == *light && known.steps == steps && known.response == *response
         };
         let known = ring.known.iter().find(is_same)?;
@@ -60,7 +60,7 @@ pub(super) fn keep(response: &Response, light: &EchoLight, steps: usize, chances
     }
     RING.with_borrow_mut(|ring| {
         if ring.known.len() < MOST_KEPT {
-            ring.known.push(Known {
+            ring.known.push(MeanHistogram {
                 response: response.clone(),
                 light: *light,
                 steps,

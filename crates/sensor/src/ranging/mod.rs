@@ -20,17 +20,17 @@ pub mod tmf8820;
 mod walk;
 
 pub use arrival::{ArrivalOptions, arrival};
-pub use calibration::{Calibration, CalibrationError, Echo, ZoneCalibration};
+pub use calibration::{Calibration, CalibrationError, ZoneCalibration, ZoneEcho};
 pub use detector::{
-    Agreement, BadDetector, Coincidence, Counted, DescribedCoincidence, DetectedReturn, Detector,
-    DetectorDescription, NoReturn, SurfaceLight, TooManyCounts,
+    Agreement, BadDetector, Coincidence, CountedEvents, DescribedCoincidence, DetectedReturn,
+    Detector, DetectorDescription, NoReturn, SurfaceLight, TooManyCounts,
 };
 pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};
 pub use peak::{Background, CentreOfMass, Peak, PeakOptions, centre_of_mass, interpolate};
 pub use profile::{BinProfile, LineProfile, OtherSensor};
-pub use returns::{Others, Return};
-pub use walk::{Corrected, WalkCorrection, WalkLeft};
+pub use returns::{Others, WindowReturn};
+pub use walk::{CorrectedPeak, WalkCorrection, WalkLeft};
 
 #[cfg(test)]
 mod tests;

@@ -39,7 +39,7 @@ const REACH: f64 = 4.0;
 
 /// A place that an echo may have.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct EchoPlace {
     /// Bins.
     pub(super) bins: f64,
     /// How many places it stands for, bins.
@@ -51,12 +51,12 @@ pub(super) struct Place {
 }
 
 /// The mean of places and its bound, bins.
-pub(super) fn mean_place(places: &[Place]) -> (f64, f64) {
+pub(super) fn mean_place(places: &[EchoPlace]) -> (f64, f64) {
     let least = places.iter().map(|place| place.deviance);
     let least = least.fold(f64::INFINITY, f64::min);
-    let weight = |place: &Place| place.width * libm::exp(0.5 * (least - place.deviance));
+    let weight = |place: &EchoPlace| place.width * libm::exp(0.5 * (least - place.deviance));
     let total: f64 = places.iter().map(weight).sum();
-    let mean_of = |value: &dyn Fn(&Place) -> f64| {
+    let mean_of = |value: &dyn Fn(&EchoPlace) -> f64| {
         let weighed = places.iter().map(|place| weight(place) * value(place));
         weighed.sum::<f64>() / total
     };
@@ -94,15 +94,17 @@ pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit
     let is_wider = chosen.light.sigma_bins > first.light.sigma_bins;
     let wider = deep.iter().chain(is_wider.then_some(chosen));
     // Where these tell no place either, those of the pulse's own width reach as far.
-    let steep = wider.filter(|fit| fit.bound_bins < 0.5).map(|fit| Place {
-        bins: fit.light.position_bins,
-        width: (std::f64::consts::TAU).sqrt() * fit.bound_bins,
-        variance: fit.bound_bins.powi(2),
-        deviance: fit.deviance,
-    });
+    let steep = wider
+        .filter(|fit| fit.bound_bins < 0.5)
+        .map(|fit| EchoPlace {
+            bins: fit.light.position_bins,
+            width: (std::f64::consts::TAU).sqrt() * fit.bound_bins,
+            variance: fit.bound_bins.powi(2),
+            deviance: fit.deviance,
+        });
     // Those behind unlikely ones are left out. Of light beyond all measure no chance is known.
     let known = own.chain(steep).filter(|place| place.deviance.is_finite());
-    let places: Vec<Place> = known.collect();
+    let places: Vec<EchoPlace> = known.collect();
     if places.is_empty() {
         return *chosen;
     }
@@ -118,7 +120,7 @@ pub(super) fn averaged(likelihood: &Likelihood<'_>, narrow: &[Fit], chosen: &Fit
 }
 
 /// Places about a fit, each with the best signal there.
-fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
+fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<EchoPlace> {
     let held = Likelihood {
         free: ONLY_SIGNAL,
         ..likelihood.clone()
@@ -148,7 +150,7 @@ fn places_of(likelihood: &Likelihood<'_>, fit: &Fit) -> Vec<Place> {
     let last = offsets.len() - 1;
     let place = |at: usize| {
         let width = 0.5 * (offsets[(at + 1).min(last)] - offsets[at.saturating_sub(1)]);
-        Place {
+        EchoPlace {
             bins: fit.light.position_bins + offsets[at],
             width,
             variance: width * width / 12.0,

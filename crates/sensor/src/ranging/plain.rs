@@ -40,13 +40,13 @@ const MOST_KEPT: usize = 64;
 
 thread_local! {
     /// The latest steps that differ, the last first.
-    static LATEST: RefCell<Vec<Rc<Steps>>> = const { RefCell::new(Vec::new()) };
+    static LATEST: RefCell<Vec<Rc<PlainSteps>>> = const { RefCell::new(Vec::new()) };
     static ROWS: RefCell<Rows> = RefCell::default();
 }
 
 /// Steps in which time goes, of one length within a bin, and what follows from them alone.
 #[derive(Debug)]
-pub(super) struct Steps {
+pub(super) struct PlainSteps {
     /// The first bin, which may lie before those of the histogram.
     first_bin: f64,
     /// Steps of each bin from there.
@@ -61,9 +61,9 @@ pub(super) struct Steps {
     parts: Vec<(usize, [f64; 4])>,
 }
 
-impl Steps {
+impl PlainSteps {
     /// Those of `bins` bins: `steps` in each with light of a pulse, and in each where SPADs recover from it a dead time of `dead` bins later.
-    pub(super) fn of(
+    pub(super) fn for_pulses(
         first_bin: f64,
         bins: usize,
         pulses: &[Pulse],
@@ -71,7 +71,7 @@ impl Steps {
         dead: f64,
     ) -> Rc<Self> {
         let steps = u8::try_from(steps).expect("few steps");
-        let lit = pulses.iter().map(|pulse| pulse.within(BEGINS, ENDS));
+        let lit = pulses.iter().map(|pulse| pulse.extent(BEGINS, ENDS));
         let lit: SmallVec<[[f64; 2]; LANES]> = lit.collect();
         let is_lit = |begin: f64| {
             lit.iter()
@@ -109,7 +109,7 @@ impl Steps {
             begin += 1.0;
         }
         times.push(begin);
-        Steps {
+        PlainSteps {
             first_bin,
             of_bins,
             dead,
@@ -244,7 +244,7 @@ pub(super) type OfBins<const K: usize> = SmallVec<[Dual<K>; 16]>;
 pub(super) fn fired<const K: usize>(
     pulse: &Pulse,
     background: f64,
-    steps: &Steps,
+    steps: &PlainSteps,
     of_bins: &mut OfBins<K>,
 ) {
     const { assert!(K == 0 || K == 4, "slopes come all together") };
@@ -255,7 +255,7 @@ pub(super) fn fired<const K: usize>(
 fn fired_in<const K: usize>(
     pulse: &Pulse,
     background: f64,
-    steps: &Steps,
+    steps: &PlainSteps,
     rows: &mut Rows,
     of_bins: &mut OfBins<K>,
 ) {
@@ -303,8 +303,8 @@ fn fired_in<const K: usize>(
         let of_pulse = until[step + 1] - until[step];
         let of_background = background * lengths[step];
         let (hit, late) = ((of_pulse + of_background) * missed, 1.0 - missed);
-        let of: &[f64; 4] = sums[first..first + 4].try_into().expect("four");
-        let now = (of[0] * a + of[1] * b) + (of[2] * c + of[3] * d);
+        let around: &[f64; 4] = sums[first..first + 4].try_into().expect("four");
+        let now = (around[0] * a + around[1] * b) + (around[2] * c + around[3] * d);
         let ending = now - ended;
         ended = now;
         if K > 0 {
@@ -349,7 +349,7 @@ type Lanes = [f64; LANES];
 pub(super) fn fired_by_each<const K: usize>(
     pulses: &[Pulse; LANES],
     background: &Lanes,
-    steps: &Steps,
+    steps: &PlainSteps,
     of_bins: &mut [OfBins<K>; LANES],
 ) {
     ROWS.with_borrow_mut(|rows| {
@@ -361,7 +361,7 @@ pub(super) fn fired_by_each<const K: usize>(
 fn fired_by_each_in<const K: usize>(
     pulses: &[Pulse; LANES],
     background: &Lanes,
-    steps: &Steps,
+    steps: &PlainSteps,
     rows: &mut LaneRows,
     of_bins: &mut [OfBins<K>; LANES],
 ) {

@@ -48,7 +48,7 @@ impl Pulse {
     }
 
     /// From `before` standard deviations before its centre to `after` ones behind it, and its late avalanches.
-    pub(super) fn within(&self, before: f64, after: f64) -> [f64; 2] {
+    pub(super) fn extent(&self, before: f64, after: f64) -> [f64; 2] {
         let late = self.tail.map_or(0.0, |tail| TAIL_REACH * tail.bins);
         let ends = self.centre + after * self.sigma + late;
         [self.centre - before * self.sigma, ends]
@@ -114,9 +114,9 @@ type Point = (f64, f64);
 
 static TABLE: LazyLock<Vec<Point>> = LazyLock::new(|| {
     let points = (2.0 * REACH * POINTS) as usize;
-    let at = |i: usize| i as f64 / POINTS - REACH;
+    let node = |i: usize| i as f64 / POINTS - REACH;
     (0..=points + 1)
-        .map(|i| (normal_above(-at(i)), normal_density(at(i))))
+        .map(|i| (normal_above(-node(i)), normal_density(node(i))))
         .collect()
 });
 

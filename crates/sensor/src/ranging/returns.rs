@@ -14,7 +14,7 @@ use std::ops::Range;
 
 /// One echo of a window.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Return {
+pub struct WindowReturn {
     /// Where it must lie, bins.
     pub position_bins: f64,
     /// Cramér-Rao bound of the position, bins; `None` where the counts are not those of an echo of this pulse.
@@ -28,16 +28,16 @@ pub struct Return {
 }
 
 /// Returns besides the first, strongest first.
-pub type Others = [Option<Return>; 3];
+pub type Others = [Option<WindowReturn>; 3];
 
 /// Another stretch of counts.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
+pub(super) struct CountStretch {
     /// Its bins, up to where no more counts come than expected.
     pub bins: Range<usize>,
     /// The fullest of them.
     pub peak_bin: usize,
-    /// See [`Return::confidence`].
+    /// See [`WindowReturn::confidence`].
     pub confidence: f64,
 }
 
@@ -99,14 +99,14 @@ impl Search<'_> {
     }
 
     /// Marks bins as those of a known echo.
-    pub(super) fn take(&mut self, bins: Range<usize>) {
+    pub(super) fn mark_bins(&mut self, bins: Range<usize>) {
         let end = bins.end.min(self.taken.len());
         let first = bins.start.min(end);
         self.taken[first..end].fill(true);
     }
 
     /// The next echo, whose bins are then taken.
-    pub(super) fn next(&mut self) -> Option<Found> {
+    pub(super) fn next(&mut self) -> Option<CountStretch> {
         let bins = self.counts.len();
         loop {
             let (ln_chance, first) = (0..=bins - self.width)
@@ -123,9 +123,9 @@ impl Search<'_> {
             let found = self.extent(peak_bin);
             let found = found.start.min(first)..found.end.max(first + self.width);
             let is_flank = self.is_flank(peak_bin);
-            self.take(found.clone());
+            self.mark_bins(found.clone());
             if !is_flank {
-                return Some(Found {
+                return Some(CountStretch {
                     bins: found,
                     peak_bin,
                     confidence: -ln_of_all / std::f64::consts::LN_10,
@@ -166,7 +166,7 @@ mod tests {
             width: 2,
             ln_false_alarm: libm::log(1e-3),
         };
-        search.take(taken);
+        search.mark_bins(taken);
         search
     }
 

@@ -115,7 +115,7 @@ impl<'r, const K: usize> Spad<'r, K> {
             background * ready * law.afterpulses
         };
         let blinding = if !law.paralysable { fired } else { light };
-        let history = |of: Dual<K>| History::new(dead / h, of * h);
+        let history = |rate: Dual<K>| History::new(dead / h, rate * h);
         let traps = Traps {
             trapping: history(traps),
             trapped,

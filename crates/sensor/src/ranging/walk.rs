@@ -105,7 +105,7 @@ pub struct WalkCorrection {
 
 /// A peak after correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Corrected {
+pub struct CorrectedPeak {
     /// The most likely light; its position is without walk.
     pub light: EchoLight,
     /// Cramér-Rao bound of the position, bins: the least standard deviation of any unbiased estimate from counts of this light. Under a
@@ -119,7 +119,7 @@ impl WalkCorrection {
     ///
     /// # Errors
     /// Why that is not known.
-    pub(crate) fn correct(&self, counts: &[f64], peak: &Peak) -> Result<Corrected, WalkLeft> {
+    pub(crate) fn correct(&self, counts: &[f64], peak: &Peak) -> Result<CorrectedPeak, WalkLeft> {
         let cycles = self.cycles(counts);
         let [background, most_background] = self.background(counts, cycles);
         let likelihood = |free: Free| Likelihood {
@@ -148,7 +148,7 @@ impl WalkCorrection {
         }
         fits[0] = self.darker(&of_all, fits[0]);
         if fits[0].explains() {
-            return self.told(&wide, &fits);
+            return self.corrected_peak(&wide, &fits);
         }
         // Few photons are an echo in one place only.
         let is_weak = fits[0].has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
@@ -156,7 +156,7 @@ impl WalkCorrection {
             fits = self.of_many(&of_all, (peak, background))?;
             fits[0] = self.darker(&of_all, fits[0]);
             if fits[0].explains() {
-                return self.told(&wide, &fits);
+                return self.corrected_peak(&wide, &fits);
             }
         }
         let best = fits[0];
@@ -174,7 +174,7 @@ impl WalkCorrection {
         }
         // Fits need not converge on the flat stretch that is a short pulse's place.
         if self.is_short(&best) {
-            return self.told(&wide, &fits);
+            return self.corrected_peak(&wide, &fits);
         }
         Err(WalkLeft::NotConverged)
     }
@@ -193,7 +193,11 @@ impl WalkCorrection {
     ///
     /// # Errors
     /// As `widened`.
-    fn told(&self, wide: &Likelihood<'_>, fits: &[Fit]) -> Result<Corrected, WalkLeft> {
+    fn corrected_peak(
+        &self,
+        wide: &Likelihood<'_>,
+        fits: &[Fit],
+    ) -> Result<CorrectedPeak, WalkLeft> {
         let widened = self.widened(wide, fits[0])?;
         let told = if self.is_short(&fits[0]) {
             averaged(wide, fits, &widened)
@@ -276,7 +280,7 @@ impl WalkCorrection {
         bins: Range<usize>,
         peak: &Peak,
         background_per_bin: f64,
-    ) -> Result<Corrected, WalkLeft> {
+    ) -> Result<CorrectedPeak, WalkLeft> {
         if self.response.counting.event_type != EventType::Greater {
             return Err(WalkLeft::NotOneEcho);
         }
@@ -403,9 +407,9 @@ impl WalkCorrection {
     }
 }
 
-impl From<Fit> for Corrected {
+impl From<Fit> for CorrectedPeak {
     fn from(fit: Fit) -> Self {
-        Corrected {
+        CorrectedPeak {
             light: fit.light,
             bound_bins: fit.bound_bins,
         }

@@ -52,7 +52,7 @@ pub(crate) fn load_stimulus<'a>(
         Drive::new(RESET_END, pins.resetb, true),
     ];
     let (end, load) = reload_stimulus(pins, clock, (enabled, LOAD_START), stream);
-    (end, Stimulus::new(power_up).with(load))
+    (end, Stimulus::new(power_up).with_drives(load))
 }
 
 /// The serial load alone: LOAD_ENABLE rises at `enabled`, the first bit is there at `start`, and the time at which all bits
@@ -77,7 +77,7 @@ pub(crate) fn reload_stimulus<'a>(
             .then(|| Drive::new(half(k), pins.serial, stream[k as usize / 2]));
         std::iter::once(edge).chain(data)
     });
-    (end, Stimulus::new(control).with(edges))
+    (end, Stimulus::new(control).with_drives(edges))
 }
 
 /// Longer than delay lines take to be empty and CLK to come to the last column.
@@ -201,7 +201,7 @@ impl StimulusPlan {
             pulses: all,
             schedule,
             skip: None,
-            order: ReadoutOrder::of(&SensorConfig {
+            order: ReadoutOrder::new(&SensorConfig {
                 rows: starts.len() / cols,
                 cols,
                 ..(*sensor).clone()

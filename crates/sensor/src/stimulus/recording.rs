@@ -49,13 +49,13 @@ fn starts_of<R: BufRead>(lines: Lines<R>, config: &SensorConfig) -> Result<Vec<u
                 config.counter_bits,
                 config.largest_start()
             );
-            return Err(InputError::at(source, line, message));
+            return Err(InputError::at_line(source, line, message));
         }
         if let Some(before) = first_line.insert(pixel, line) {
             let message = format!(
                 "macropixel ({r}, {c}) already has a start value in line {before}; remove one of them"
             );
-            return Err(InputError::at(source, line, message));
+            return Err(InputError::at_line(source, line, message));
         }
         starts[pixel] = Some(init as u16);
     }
@@ -87,7 +87,7 @@ impl Recording {
     ///
     /// # Panics
     /// When the array has no such macropixel.
-    pub fn of(
+    pub fn from_events(
         events: impl IntoIterator<Item = (usize, SpadEvent)>,
         config: &SensorConfig,
         exposure: &Exposure,
@@ -168,13 +168,13 @@ fn events_of<R: BufRead>(
                 "SPAD {spad} does not exist; give 0 to {}",
                 config.spads() - 1
             );
-            return Err(InputError::at(source, line, message));
+            return Err(InputError::at_line(source, line, message));
         }
         if time_fs < 0 {
             let message = format!(
                 "an event at {time_fs} fs is before time 0, the first rising edge of STOP; shift or remove it"
             );
-            return Err(InputError::at(source, line, message));
+            return Err(InputError::at_line(source, line, message));
         }
         let event = SpadEvent::new(Time::from_fs(time_fs), spad as u8);
         recording.push(pixel, event, exposure);
@@ -201,7 +201,7 @@ fn pixel_index(
         config.rows - 1,
         config.cols - 1
     );
-    Err(InputError::at(source, line, message))
+    Err(InputError::at_line(source, line, message))
 }
 
 /// Line number and numbers of every line of a table with this header. Blank lines and lines that start with
@@ -217,7 +217,7 @@ fn rows<R: BufRead, const N: usize>(
         Some((line, found)) => {
             let found: String = found.chars().take(80).collect();
             let message = format!("the header is {found:?}; it must be \"{expected}\"");
-            return Err(InputError::at(source, line, message));
+            return Err(InputError::at_line(source, line, message));
         }
         None => {
             let message = format!("the file is empty; start it with the header \"{expected}\"");
@@ -230,19 +230,19 @@ fn rows<R: BufRead, const N: usize>(
         for (value, name) in values.iter_mut().zip(header) {
             let Some(field) = fields.next() else {
                 let message = format!("{name} is missing; a line needs \"{expected}\"");
-                return Err(InputError::at(&source, line, message));
+                return Err(InputError::at_line(&source, line, message));
             };
             *value = field.parse().map_err(|_| {
                 let field: String = field.chars().take(80).collect();
                 let message = format!("{name} is {field:?}; write a whole number");
-                InputError::at(&source, line, message)
+                InputError::at_line(&source, line, message)
             })?;
         }
         match fields.next() {
             None => Ok((line, values)),
             Some(_) => {
                 let message = format!("too many values; a line needs \"{expected}\"");
-                Err(InputError::at(&source, line, message))
+                Err(InputError::at_line(&source, line, message))
             }
         }
     };
@@ -284,7 +284,7 @@ mod tests {
             let time = Time::from_fs(fs);
             (pixel, SpadEvent { time, spad })
         });
-        assert_eq!(Recording::of(events, &config(), &exposure()), read);
+        assert_eq!(Recording::from_events(events, &config(), &exposure()), read);
         assert_eq!((read.lost_to_dead_time, read.after_the_end), (1, 1));
     }
 

@@ -45,7 +45,7 @@ impl Export<'_> {
     /// # Errors
     /// When the folder or a file in it cannot be written.
     pub fn write(self, folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
-        let (silicon, corner) = (Silicon::of(config), config.corner);
+        let (silicon, corner) = (Silicon::new(config), config.corner);
         let library = silicon.cell_library.cells();
         let top = array::circuit(config);
         let netlist = Netlist::elaborate(&top);
@@ -103,7 +103,7 @@ fn write_stimulus(out: &mut dyn Write, netlist: &Netlist, plan: &StimulusPlan) -
     for (pin, net) in netlist.inputs().into_iter().enumerate() {
         pin_of_net[net.index()] = pin;
     }
-    for drive in plan.stimulus(&SensorPins::of(netlist)) {
+    for drive in plan.stimulus(&SensorPins::find(netlist)) {
         let (time_fs, pin) = (drive.time.as_fs(), pin_of_net[drive.net.index()]);
         writeln!(out, "{time_fs} {pin} {}", drive.value)?;
     }

@@ -115,7 +115,7 @@ mod tests {
         let exposure = Exposure::new(&quantic4x4, 60, 1);
         assert_eq!(last_start(&quantic4x4, &exposure), 61);
         let law = crate::chip::WindowLaw::new(&quantic4x4, &exposure);
-        assert_eq!(law.window(61), crate::chip::Window::Never);
+        assert_eq!(law.window(61), crate::chip::WindowOutcome::Never);
         let starts = (0..500).map(|seed| drawn(seed, &start_values(&quantic4x4, &exposure)));
         assert_eq!(starts.max(), Some(61));
     }

@@ -64,7 +64,7 @@ const HEAD: &str = "library (random) {
 
 impl Maker<'_> {
     /// `middle`, or up to three times more or less.
-    fn about(&mut self, middle: f64) -> f64 {
+    fn within_factor_3(&mut self, middle: f64) -> f64 {
         middle * libm::pow(3.0, 2.0 * (self.next)() - 1.0)
     }
 
@@ -111,7 +111,7 @@ impl Maker<'_> {
     }
 
     fn input(&mut self, name: &str, more: &str) {
-        let load = self.about(0.0009);
+        let load = self.within_factor_3(0.0009);
         let _ = writeln!(
             self.text,
             "    pin ({name}) {{ direction : input; capacitance : {load:.6}; {more} }}"
@@ -128,10 +128,10 @@ impl Maker<'_> {
         }
         self.text.push('\n');
         for edge in edges {
-            let base = self.about(delay) * self.slower;
-            let per_pf = self.about(4.0) * self.slower;
+            let base = self.within_factor_3(delay) * self.slower;
+            let per_pf = self.within_factor_3(4.0) * self.slower;
             self.table(&format!("cell_{edge}"), [base, 0.18, per_pf]);
-            let per_pf = self.about(7.0) * self.slower;
+            let per_pf = self.within_factor_3(7.0) * self.slower;
             self.table(
                 &format!("{edge}_transition"),
                 [0.006 * self.slower, 0.04, per_pf],
@@ -154,7 +154,7 @@ impl Maker<'_> {
     fn limit(&mut self, kind: &str, middle: f64, edges: &[&str]) -> String {
         let mut text = format!("timing () {{ related_pin : \"CK\"; timing_type : {kind}_rising; ");
         for edge in edges {
-            let mut ns = self.about(middle) * self.slower;
+            let mut ns = self.within_factor_3(middle) * self.slower;
             // Some libraries have negative hold and removal times.
             if matches!(kind, "hold" | "removal") && self.has(0.3) {
                 ns = -ns;
@@ -169,8 +169,8 @@ impl Maker<'_> {
 
     fn flip_flop(&mut self, name: &str, preset: bool) {
         let (high, low) = (
-            self.about(0.04) * self.slower,
-            self.about(0.04) * self.slower,
+            self.within_factor_3(0.04) * self.slower,
+            self.within_factor_3(0.04) * self.slower,
         );
         let _ = write!(
             self.text,
@@ -193,7 +193,7 @@ impl Maker<'_> {
         ];
         self.input("D", &data.join(" "));
         for control in if preset { &["R", "S"][..] } else { &["R"] } {
-            let width = self.about(0.04) * self.slower;
+            let width = self.within_factor_3(0.04) * self.slower;
             let limits = [
                 self.limit("recovery", 0.02, &["fall"]),
                 self.limit("removal", 0.015, &["fall"]),

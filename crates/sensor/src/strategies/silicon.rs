@@ -18,7 +18,11 @@ const USUAL: Conditions = Conditions {
 };
 
 /// Numbers of a range, as whole steps away from a middle towards which they shrink.
-fn about(middle: f64, steps: RangeInclusive<i32>, step: f64) -> impl Strategy<Value = f64> + Clone {
+fn near_middle(
+    middle: f64,
+    steps: RangeInclusive<i32>,
+    step: f64,
+) -> impl Strategy<Value = f64> + Clone {
     steps.prop_map(move |steps| middle + f64::from(steps) * step)
 }
 
@@ -29,14 +33,14 @@ pub(super) fn corners() -> impl Strategy<Value = Corner> + Clone {
 
 /// Junction temperatures from −40 to 125 °C. They shrink towards 50 °C.
 pub(super) fn temperatures_c() -> impl Strategy<Value = f64> + Clone {
-    about(USUAL.temperature_c, -90..=75, 1.0)
+    near_middle(USUAL.temperature_c, -90..=75, 1.0)
 }
 
 /// Any process, 0.95 to 1.3 V, −40 to 125 °C: delays are known for all of them.
 ///
 /// Shrinks towards typical silicon at 1.1 V and 50 °C.
 pub fn conditions() -> impl Strategy<Value = Conditions> + Clone {
-    let voltages_v = about(USUAL.voltage_v, -15..=20, 0.01);
+    let voltages_v = near_middle(USUAL.voltage_v, -15..=20, 0.01);
     (corners(), voltages_v, temperatures_c()).prop_map(|(process, voltage_v, temperature_c)| {
         Conditions {
             process,
@@ -58,7 +62,7 @@ pub fn mismatches() -> impl Strategy<Value = Mismatch> + Clone {
 ///
 /// The sensor must have passed [`SensorConfig::check`]. Shrinks towards its own silicon.
 pub fn silicon(config: &SensorConfig) -> impl Strategy<Value = Silicon> + Clone + use<> {
-    let own = Silicon::of(config);
+    let own = Silicon::new(config);
     let conditions = proptest::option::weighted(0.7, conditions());
     let mismatch = proptest::option::weighted(0.3, mismatches());
     (conditions, mismatch).prop_map(move |(conditions, mismatch)| {

@@ -22,7 +22,7 @@ use crate::ranging::BinProfile;
 use crate::reproduce::measured::penalty::{ratio, sum};
 use crate::theory::Pulse;
 use crate::theory::estimators::InEdges;
-use crate::theory::partial::{Step, System};
+use crate::theory::partial::{ExposureStep, System};
 use crate::units::{Time, TimeOfFlight};
 
 /// Seeds of a step from here on are free: those before are of measurements and exposures of detections ([`steps`](super::steps)).
@@ -111,7 +111,7 @@ struct Frame {
 }
 
 /// A measurement, and how many of its frames have a full bin.
-struct Taken {
+struct DelayLineMeasurement {
     measurement: Measurement,
     full: u32,
 }
@@ -138,7 +138,12 @@ impl Chip<'_> {
     }
 
     /// A measurement in the window of `start`, in the light of `step`.
-    fn measuring(&self, start: u16, step: &Step, frames: usize) -> Result<Taken, EngineError> {
+    fn measuring(
+        &self,
+        start: u16,
+        step: &ExposureStep,
+        frames: usize,
+    ) -> Result<DelayLineMeasurement, EngineError> {
         let cycles = measured_cycles(step);
         let frames = self.frames(start, step, cycles, frames)?;
         let (background_per_ns, signal) = self.levels(&frames);
@@ -157,8 +162,8 @@ impl Chip<'_> {
         let errors: Vec<f64> = errors.collect();
         let most = (1 << self.sensor.bin_bits) - 1;
         let full = frames.iter().filter(|frame| frame.counts.contains(&most));
-        Ok(Taken {
-            measurement: Measurement::of(&errors, cycles, wanted_ns(self.system)),
+        Ok(DelayLineMeasurement {
+            measurement: Measurement::from_errors(&errors, cycles, wanted_ns(self.system)),
             full: full.count() as u32,
         })
     }
@@ -171,7 +176,7 @@ impl Chip<'_> {
     fn frames(
         &self,
         start: u16,
-        step: &Step,
+        step: &ExposureStep,
         cycles: u32,
         frames: usize,
     ) -> Result<Vec<Frame>, EngineError> {

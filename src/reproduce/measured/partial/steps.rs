@@ -12,10 +12,10 @@ use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, Z_95, deviation, share};
 use crate::numerics::{ln_normal_below, normal_density};
 use crate::reproduce::measured::FRAMES;
-use crate::reproduce::measured::detection::judged;
+use crate::reproduce::measured::detection::detection_share;
 use crate::reproduce::measured::precision::{Estimator, errors_ns};
 use crate::reproduce::measured::trial::Trial;
-use crate::theory::partial::{Purpose, Step, System, largest_mean};
+use crate::theory::partial::{ExposureStep, StepPurpose, System, largest_mean};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Photons that all frames of a detection take together at 300 frames: about half a second on one core.
@@ -65,7 +65,7 @@ pub(crate) struct Measurement {
 
 impl Measurement {
     /// From the errors of frames of `cycles` laser cycles, ns, and the spread that is wanted, ns.
-    pub(super) fn of(errors_ns: &[f64], cycles: u32, wanted_ns: f64) -> Self {
+    pub(super) fn from_errors(errors_ns: &[f64], cycles: u32, wanted_ns: f64) -> Self {
         let of_the_echo = errors_ns
             .iter()
             .filter(|e| e.abs() <= OF_THE_ECHO * wanted_ns);
@@ -85,12 +85,12 @@ pub(super) fn wanted_ns(system: &System) -> f64 {
 }
 
 /// Laser cycles of the exposures by which a measurement is judged.
-pub(super) fn measured_cycles(step: &Step) -> u32 {
+pub(super) fn measured_cycles(step: &ExposureStep) -> u32 {
     step.laser_cycles.max(FEWEST_CYCLES) as u32
 }
 
 /// Photon light at a range, on this macropixel.
-fn lit(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
+fn trial_at(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
     Trial {
         sensor: sensor.clone(),
         ..Trial::of_link(&system.link, range_m, cycles)
@@ -98,7 +98,7 @@ fn lit(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
 }
 
 /// Seeds of a step that nothing else has.
-pub(super) fn seed(step: &Step) -> u64 {
+pub(super) fn seed(step: &ExposureStep) -> u64 {
     (1e4 * step.range_m) as u64 * 100
 }
 
@@ -106,32 +106,32 @@ pub(super) fn seed(step: &Step) -> u64 {
 pub(super) fn measuring(
     system: &System,
     sensor: &Sensor,
-    step: &Step,
+    step: &ExposureStep,
     frames: usize,
 ) -> Result<Measurement, EngineError> {
     let wanted_ns = wanted_ns(system);
     let cycles = measured_cycles(step);
     let trial = Trial {
         echo_bins: f64::from(system.bins / 2),
-        ..lit(system, sensor, step.range_m, cycles)
+        ..trial_at(system, sensor, step.range_m, cycles)
     };
-    let trial = trial.on(|sensor| sensor.clk_hz = 1.0 / system.bin_s);
+    let trial = trial.with_sensor_change(|sensor| sensor.clk_hz = 1.0 / system.bin_s);
     let all = errors_ns(&trial, frames, seed(step) + 1, Estimator::Likelihood)?;
-    Ok(Measurement::of(&all, cycles, wanted_ns))
+    Ok(Measurement::from_errors(&all, cycles, wanted_ns))
 }
 
 /// A detection on the chip with a slow CLK, in the conventional mode; `None` for a step that is none.
 pub(super) fn detecting(
     system: &System,
     sensor: &Sensor,
-    step: &Step,
+    step: &ExposureStep,
     frames: usize,
 ) -> Result<Option<Detection>, EngineError> {
-    let Purpose::Detect { candidates, bin_m } = step.purpose else {
+    let StepPurpose::Detect { candidates, bin_m } = step.purpose else {
         return Ok(None);
     };
     let reckoned = step.laser_cycles;
-    let trial = lit(system, sensor, step.range_m, reckoned as u32);
+    let trial = trial_at(system, sensor, step.range_m, reckoned as u32);
     let trial = trial.in_coarse_bins(candidates, bin_m);
 
     let light = trial.per_cycle();
@@ -165,7 +165,7 @@ pub(super) fn detecting(
         candidates,
         bin_m,
         reckoned,
-        found: judged(&trial, &counts, true),
+        found: detection_share(&trial, &counts, true),
         frames,
         cycles: cycles_from(&counts, reckoned, system.goal.detection),
         exposures,
@@ -224,15 +224,15 @@ fn won(n: f64, [echo, other]: [f64; 2], rivals: usize) -> f64 {
     // Simpson's rule over ±8 σ of the echo's bin.
     const STEPS: usize = 400;
     let step = 16.0 / STEPS as f64;
-    let at = |k: usize| {
+    let integrand = |k: usize| {
         let x = -8.0 + step * k as f64;
         let beaten = ln_normal_below((ahead + x * sigma(echo)) / sigma(other));
         normal_density(x) * libm::exp(rivals as f64 * beaten)
     };
     let inner: f64 = (1..STEPS)
-        .map(|k| if k % 2 == 1 { 4.0 } else { 2.0 } * at(k))
+        .map(|k| if k % 2 == 1 { 4.0 } else { 2.0 } * integrand(k))
         .sum();
-    (at(0) + inner + at(STEPS)) * step / 3.0
+    (integrand(0) + inner + integrand(STEPS)) * step / 3.0
 }
 
 #[cfg(test)]

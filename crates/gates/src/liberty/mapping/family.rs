@@ -108,7 +108,7 @@ impl CellModel {
     fn slew(&self, slew_fs: f64, load_ff: f64) -> f64 {
         let slews = self.arcs.iter().map(|arc| {
             let own = self.outputs[arc.to].load_ff[arc.effect as usize];
-            arc.slew.at(slew_fs, own + load_ff)
+            arc.slew.interpolate(slew_fs, own + load_ff)
         });
         slews.fold(0.0, f64::max)
     }
@@ -120,7 +120,7 @@ impl CellModel {
             let slews = self.arcs.iter().map(|arc| {
                 let edge = arc.effect as usize;
                 let load = fan_out * self.inputs[0].load_ff[edge] + self.outputs[0].load_ff[edge];
-                arc.slew.at(slew, load)
+                arc.slew.interpolate(slew, load)
             });
             slews.fold(0.0, f64::max)
         })

@@ -150,7 +150,7 @@ fn every_gate_is_made_from_few_cells() {
             for inputs in 0..1 << function.inputs {
                 assert_eq!(
                     computed(recipe, inputs),
-                    function.at(inputs),
+                    function.value(inputs),
                     "{} {inputs}",
                     kind.name()
                 );

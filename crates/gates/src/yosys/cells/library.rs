@@ -1,6 +1,6 @@
 //! Cells of a Liberty file, as `abc -liberty` and `dfflibmap` place them, by what the file says that they do.
 
-use super::{Given, Placing, YosysError};
+use super::{Placing, YosysCell, YosysError};
 use crate::liberty::{CellFunction, Role, TruthTable};
 use crate::netlist::CellKind::{And2, Buf, Inv, Mux2, Nand2, Nor2, Or2, Xnor2, Xor2};
 use crate::netlist::Net;
@@ -8,7 +8,7 @@ use crate::netlist::Net;
 /// Places what has the function of a library's cell.
 pub(super) fn place(
     to: &mut Placing<'_>,
-    given: &Given<'_>,
+    given: &YosysCell<'_>,
     function: &CellFunction,
 ) -> Result<(), YosysError> {
     let pins = function.inputs.iter().map(|pin| to.pin(given, pin));
@@ -27,7 +27,7 @@ pub(super) fn place(
     let [reset, set] = [flip_flop.clear, flip_flop.preset].map(|pin| Some(active(to, pin?)));
     let outputs = [flip_flop.q, flip_flop.qn].map(|output| {
         let name = &function.outputs[output?];
-        let is_open = given.of.connections.get(name).is_none_or(Vec::is_empty);
+        let is_open = given.entry.connections.get(name).is_none_or(Vec::is_empty);
         (!is_open).then(|| to.pin(given, name))
     });
     let [q, qn] = outputs.map(Option::transpose);
@@ -38,7 +38,7 @@ impl Placing<'_> {
     /// Gates that make a function of these inputs: input after input is split off, one that takes a single gate first.
     fn function(
         &mut self,
-        given: &Given<'_>,
+        given: &YosysCell<'_>,
         table: TruthTable,
         inputs: &[Net],
         output: Option<Net>,

@@ -133,7 +133,7 @@ impl Waves {
                 continue;
             };
             if earliest.as_ref().is_none_or(|(first, _)| time < *first) {
-                let [ours, theirs] = [ours, theirs].map(|changes| around(changes, time));
+                let [ours, theirs] = [ours, theirs].map(|changes| state_text(changes, time));
                 let [our_name, their_name] = names;
                 let text = format!("{path} at {time} fs: {our_name} {ours}, {their_name} {theirs}");
                 earliest = Some((time, text));
@@ -153,7 +153,7 @@ fn first_difference(a: &Changes, b: &Changes) -> Option<u64> {
 }
 
 /// What a signal is at a time, since when and until when.
-fn around(changes: &Changes, time: u64) -> String {
+fn state_text(changes: &Changes, time: u64) -> String {
     let next = changes.partition_point(|(t, _)| *t <= time);
     let now = match next.checked_sub(1).map(|last| &changes[last]) {
         Some((since, value)) => format!("is {value} since {since}"),

@@ -12,14 +12,17 @@ use std::path::Path;
 
 use femtogate::InputError;
 
-use super::{Histograms, ZoneCounts, counts_of, cure};
+use super::{ZoneCounts, ZoneHistograms, counts_of, cure};
 use crate::files::input::read_text;
 
 /// Cells before the first bin.
 const BEFORE: usize = 5;
 
 /// Reads a log.
-pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histograms, InputError> {
+pub(super) fn read(
+    path: &Path,
+    counts_per_unit: Option<f64>,
+) -> Result<ZoneHistograms, InputError> {
     let text = read_text(path)?;
     let mut bins = 0;
     // The zones of each capture.
@@ -33,7 +36,7 @@ pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histogra
         if cells.first() != Some(&"Agg") {
             continue;
         }
-        let complain = |message: String| InputError::at(path.display(), 1 + number, message);
+        let complain = |message: String| InputError::at_line(path.display(), 1 + number, message);
         let cured = "give `Agg, zone, word, ambient, word, values`";
         let zone = cells.get(1).and_then(|cell| cell.parse::<usize>().ok());
         let ambient = cells.get(3).and_then(|cell| cell.parse::<f64>().ok());
@@ -73,7 +76,7 @@ pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histogra
     let zones = captures.iter().map(Vec::len).max().unwrap_or(0);
     let all = captures.len();
     captures.retain(|capture| capture.len() == zones && zones > 0);
-    Ok(Histograms {
+    Ok(ZoneHistograms {
         bins,
         cut_short: all - captures.len(),
         captures: captures
@@ -92,7 +95,7 @@ mod tests {
     use super::super::tests::read_bytes;
     use super::*;
 
-    fn read(text: &str, counts_per_unit: Option<f64>) -> Result<Histograms, String> {
+    fn read(text: &str, counts_per_unit: Option<f64>) -> Result<ZoneHistograms, String> {
         read_bytes(
             "log.csv",
             text.as_bytes(),

@@ -36,7 +36,7 @@ pub enum HistogramFormat {
 
 /// Histograms of equally many bins: captures of zones.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Histograms {
+pub struct ZoneHistograms {
     /// Bins of each.
     pub bins: usize,
     /// In the order in which they were taken; all have as many zones.
@@ -56,7 +56,7 @@ pub struct ZoneCounts {
     pub own_depths_m: Vec<Option<f64>>,
 }
 
-impl Histograms {
+impl ZoneHistograms {
     /// Reads a file. Numbers that are no counts are multiplied by `counts_per_unit` and rounded; less than none is none.
     ///
     /// # Errors
@@ -159,11 +159,11 @@ mod tests {
         bytes: &[u8],
         format: HistogramFormat,
         counts_per_unit: Option<f64>,
-    ) -> Result<Histograms, String> {
+    ) -> Result<ZoneHistograms, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        Histograms::read(&path, format, counts_per_unit).map_err(|error| error.to_string())
+        ZoneHistograms::read(&path, format, counts_per_unit).map_err(|error| error.to_string())
     }
 
     #[test]

@@ -14,13 +14,16 @@ use femtogate::{InputError, in_words};
 use serde_json::Value;
 
 use super::npz::read_counts;
-use super::{Histograms, ZoneCounts, counts_of, cure};
+use super::{ZoneCounts, ZoneHistograms, counts_of, cure};
 use crate::files::guarded::open_input;
 use crate::files::input::{Lines, parse_json, read_text};
 use crate::files::npy::{NpyHead, Number};
 
 /// Reads a file; its name says which of them it is.
-pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histograms, InputError> {
+pub(super) fn read(
+    path: &Path,
+    counts_per_unit: Option<f64>,
+) -> Result<ZoneHistograms, InputError> {
     let extension = path.extension().and_then(|extension| extension.to_str());
     let (bins, counts) = match extension {
         Some("npy") => {
@@ -41,7 +44,7 @@ pub(super) fn read(path: &Path, counts_per_unit: Option<f64>) -> Result<Histogra
         counts,
         ..ZoneCounts::default()
     };
-    Ok(Histograms {
+    Ok(ZoneHistograms {
         bins,
         captures: vec![capture],
         cut_short: 0,
@@ -53,7 +56,7 @@ fn read_lines(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u
     let (mut bins, mut counts) = (0, Vec::new());
     let mut is_first = true;
     while let Some((number, line)) = lines.next_used()? {
-        let complain = |message: String| InputError::at(path.display(), number, message);
+        let complain = |message: String| InputError::at_line(path.display(), number, message);
         let cells: Vec<&str> = cells_of(line);
         let is_heading = is_first && cells.iter().all(|cell| cell.parse::<f64>().is_err());
         is_first = false;
@@ -207,16 +210,16 @@ mod tests {
     use crate::files::write_npy;
     use proptest::prelude::*;
 
-    fn read(name: &str, bytes: &[u8]) -> Result<Histograms, String> {
+    fn read(name: &str, bytes: &[u8]) -> Result<ZoneHistograms, String> {
         read_bytes(name, bytes, HistogramFormat::Table, None)
     }
 
-    fn zones(bins: usize, counts: &[u32]) -> Histograms {
+    fn zones(bins: usize, counts: &[u32]) -> ZoneHistograms {
         let capture = ZoneCounts {
             counts: counts.to_vec(),
             ..ZoneCounts::default()
         };
-        Histograms {
+        ZoneHistograms {
             bins,
             captures: vec![capture],
             cut_short: 0,

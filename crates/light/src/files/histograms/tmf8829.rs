@@ -17,7 +17,7 @@ use femtogate::InputError;
 use flate2::read::MultiGzDecoder;
 use serde::Deserialize;
 
-use super::{Histograms, ZoneCounts};
+use super::{ZoneCounts, ZoneHistograms};
 use crate::files::guarded::open_input;
 use crate::files::input::parse_json;
 
@@ -60,7 +60,7 @@ struct ZonePeak {
 }
 
 /// Reads a log.
-pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
+pub(super) fn read(path: &Path) -> Result<ZoneHistograms, InputError> {
     let complain = |message: String| InputError::new(path.display(), message);
     let wanted = "a log of a TMF8829 with a `Result_Set`";
     let log: Log = parse_json(path.display(), &unpacked(path)?, wanted)?;
@@ -95,7 +95,7 @@ pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
             },
         });
     }
-    Ok(Histograms {
+    Ok(ZoneHistograms {
         bins,
         captures,
         cut_short,
@@ -157,13 +157,13 @@ mod tests {
         {"mp_histo": [[{"bin": [1, 2, 3]}, {"bin": [4, 5, 6]}]], "ref_histo": [{"bin": [9, 1, 0]}, {"bin": [8, 0, 0]}],
          "results": [[{"noise": 3, "peaks": [{"distance": 1500, "snr": 9}]}, {"peaks": [{"distance": 0}]}]]}]}"#;
 
-    fn read(bytes: &[u8]) -> Result<Histograms, String> {
+    fn read(bytes: &[u8]) -> Result<ZoneHistograms, String> {
         read_bytes("log.json.gz", bytes, HistogramFormat::Tmf8829, None)
     }
 
     #[test]
     fn logs_are_read_packed_or_not() {
-        let expected = Histograms {
+        let expected = ZoneHistograms {
             bins: 3,
             captures: vec![ZoneCounts {
                 counts: vec![1, 2, 3, 4, 5, 6],

@@ -15,7 +15,7 @@ use std::path::Path;
 
 use femtogate::InputError;
 
-use super::{Histograms, ZoneCounts};
+use super::{ZoneCounts, ZoneHistograms};
 use crate::files::input::read_text;
 
 const CHANNELS: usize = 10;
@@ -24,9 +24,9 @@ const CHANNELS: usize = 10;
 const LINES: usize = 3 * CHANNELS;
 
 /// Reads a log.
-pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
+pub(super) fn read(path: &Path) -> Result<ZoneHistograms, InputError> {
     let text = read_text(path)?;
-    let mut found = Histograms {
+    let mut found = ZoneHistograms {
         bins: 0,
         captures: Vec::new(),
         cut_short: 0,
@@ -38,7 +38,7 @@ pub(super) fn read(path: &Path) -> Result<Histograms, InputError> {
         let Some(rest) = line.trim().strip_prefix("#Raw,") else {
             continue;
         };
-        let complain = |message: String| InputError::at(path.display(), 1 + number, message);
+        let complain = |message: String| InputError::at_line(path.display(), 1 + number, message);
         let cells: Vec<&str> = rest
             .split(',')
             .map(str::trim)
@@ -129,7 +129,7 @@ mod tests {
         text
     }
 
-    fn read(text: &str) -> Result<Histograms, String> {
+    fn read(text: &str) -> Result<ZoneHistograms, String> {
         read_bytes("log.txt", text.as_bytes(), HistogramFormat::Tmf882x, None)
     }
 

@@ -90,7 +90,7 @@ fn all_kinds_hold_the_same_numbers() {
         let raster = read(&bytes).unwrap();
         assert_eq!((raster.width, raster.height), (3, 2));
         assert_eq!(raster.values, expected);
-        assert_eq!(raster.at(1, 2), 60000.0);
+        assert_eq!(raster.value(1, 2), 60000.0);
     }
     let colours = png_of(1, 1, ColorType::Rgb, BitDepth::Eight, &[200, 100, 50]);
     let grey = read(&colours).unwrap();

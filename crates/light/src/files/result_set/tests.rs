@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn put(folder: &Path, files: &[(&str, &str)]) -> Vec<String> {
+fn commit_files(folder: &Path, files: &[(&str, &str)]) -> Vec<String> {
     let set = ResultSet::begin(folder, "test").unwrap();
     for (name, text) in files {
         fs::write(set.staging().join(name), text).unwrap();
@@ -48,14 +48,14 @@ fn a_set_that_is_given_up_leaves_no_folder_but_one_that_was_there() {
 fn a_set_replaces_the_one_before_it() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    assert!(put(&out, &[("a", "1"), ("probe_1", "x"), ("probe_2", "y")]).is_empty());
+    assert!(commit_files(&out, &[("a", "1"), ("probe_1", "x"), ("probe_2", "y")]).is_empty());
     fs::write(out.join("notes.txt"), "mine").unwrap();
-    assert!(put(&out, &[("a", "2"), ("probe_3", "z")]).is_empty());
+    assert!(commit_files(&out, &[("a", "2"), ("probe_3", "z")]).is_empty());
     let expected = [("a", "2"), ("notes.txt", "mine"), ("probe_3", "z")];
     assert_eq!(listing(&out), owned(&expected));
     let manifest = Manifest::read(&out).unwrap();
     assert!(manifest.complete);
-    let known = ManifestFile::of(&out, "a").unwrap();
+    let known = ManifestFile::from_file(&out, "a").unwrap();
     assert_eq!(manifest.files[0], known);
     // sha256sum of "2".
     assert_eq!(
@@ -68,7 +68,7 @@ fn a_set_replaces_the_one_before_it() {
 fn a_set_beside_others_keeps_those_without_a_successor() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    put(&out, &[("a", "1"), ("b", "2")]);
+    commit_files(&out, &[("a", "1"), ("b", "2")]);
     fs::write(out.join("b"), "mine").unwrap();
     let set = ResultSet::begin(&out, "test").unwrap().beside_others();
     fs::write(set.staging().join("c"), "3").unwrap();
@@ -86,7 +86,7 @@ fn a_set_beside_others_keeps_those_without_a_successor() {
 fn a_file_that_says_the_same_is_not_set_aside() {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("a"), "1").unwrap();
-    assert!(put(dir.path(), &[("a", "1")]).is_empty());
+    assert!(commit_files(dir.path(), &[("a", "1")]).is_empty());
     assert_eq!(listing(dir.path()), owned(&[("a", "1")]));
 }
 
@@ -96,13 +96,13 @@ fn what_the_user_changed_or_made_is_kept_and_said() {
     let out = dir.path();
     fs::write(out.join("a.png"), "mine, before any run").unwrap();
     fs::write(out.join(MANIFEST), "{\"mine\": 1}").unwrap();
-    let said = put(out, &[("a.png", "1"), ("b", "1"), ("old", "1")]);
+    let said = commit_files(out, &[("a.png", "1"), ("b", "1"), ("old", "1")]);
     assert_eq!(said.len(), 2, "{said:?}");
     assert!(said[0].contains("a.kept.png"), "{said:?}");
 
     fs::write(out.join("a.png"), "2 by the user").unwrap();
     fs::write(out.join("old"), "2").unwrap();
-    let said = put(out, &[("a.png", "3"), ("b", "3")]);
+    let said = commit_files(out, &[("a.png", "3"), ("b", "3")]);
     assert_eq!(said.len(), 2, "{said:?}");
     let expected = [
         ("a.kept-2.png", "2 by the user"),
@@ -119,16 +119,16 @@ fn what_the_user_changed_or_made_is_kept_and_said() {
 fn a_switch_that_was_killed_says_so_and_is_put_right_by_the_next() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path();
-    put(out, &[("a", "old a"), ("b", "old b"), ("probe", "old")]);
+    commit_files(out, &[("a", "old a"), ("b", "old b"), ("probe", "old")]);
     // As far as a killed switch came: the manifest of both, and one of two files.
     let mut manifest = Manifest::read(out).unwrap();
     manifest.complete = false;
     manifest.previous_files = std::mem::take(&mut manifest.files);
     fs::write(out.join("a"), "new a").unwrap();
-    manifest.files = vec![ManifestFile::of(out, "a").unwrap()];
+    manifest.files = vec![ManifestFile::from_file(out, "a").unwrap()];
     manifest.write(&out.join(MANIFEST)).unwrap();
 
-    assert!(put(out, &[("a", "newer a"), ("b", "newer b")]).is_empty());
+    assert!(commit_files(out, &[("a", "newer a"), ("b", "newer b")]).is_empty());
     assert_eq!(listing(out), owned(&[("a", "newer a"), ("b", "newer b")]));
     assert!(Manifest::read(out).unwrap().complete);
 }
@@ -137,7 +137,7 @@ fn a_switch_that_was_killed_says_so_and_is_put_right_by_the_next() {
 fn a_set_of_another_command_is_refused_and_untouched() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path();
-    put(out, &[("a", "1")]);
+    commit_files(out, &[("a", "1")]);
     let before = fs::read_dir(out).unwrap().count();
     let refused = ResultSet::begin(out, "other").unwrap_err().to_string();
     assert!(refused.contains("results of `gdtof test`"), "{refused}");
@@ -147,7 +147,7 @@ fn a_set_of_another_command_is_refused_and_untouched() {
     let new = out.join("new");
     let set = ResultSet::begin(&new, "other").unwrap();
     fs::write(set.staging().join("a"), "2").unwrap();
-    put(&new, &[("a", "1")]);
+    commit_files(&new, &[("a", "1")]);
     assert!(set.commit(()).is_err());
     assert_eq!(listing(&new), owned(&[("a", "1")]));
 
@@ -167,7 +167,7 @@ fn a_set_of_another_command_is_refused_and_untouched() {
 fn a_set_that_is_not_committed_leaves_the_old_one() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path();
-    put(out, &[("a", "1")]);
+    commit_files(out, &[("a", "1")]);
     let set = ResultSet::begin(out, "test").unwrap();
     fs::write(set.staging().join("a"), "2").unwrap();
     drop(set);
@@ -189,11 +189,11 @@ fn a_set_that_is_not_committed_leaves_the_old_one() {
 fn a_manifest_that_points_elsewhere_removes_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
-    put(&out, &[("a", "1")]);
+    commit_files(&out, &[("a", "1")]);
     fs::write(dir.path().join("a"), "1").unwrap();
     let text = fs::read_to_string(out.join(MANIFEST)).unwrap();
     let text = text.replace("\"name\": \"a\"", "\"name\": \"../a\"");
     fs::write(out.join(MANIFEST), text).unwrap();
-    put(&out, &[("b", "1")]);
+    commit_files(&out, &[("b", "1")]);
     assert_eq!(fs::read_to_string(dir.path().join("a")).unwrap(), "1");
 }

@@ -241,10 +241,10 @@ impl PixelLight {
 
     /// Greatest mean rate of photons of other lasers, per second, where each pulse blinds all SPADs at most some times.
     pub(crate) fn trains_hz(&self) -> f64 {
-        let of = |train: &PulseTrain| train.photons.min(MOST_PER_PULSE) / train.laser.period_s;
+        let rate_hz = |train: &PulseTrain| train.photons.min(MOST_PER_PULSE) / train.laser.period_s;
         let each = self
             .segments()
-            .map(|segment| segment.trains.iter().map(of).sum());
+            .map(|segment| segment.trains.iter().map(rate_hz).sum());
         each.fold(0.0, f64::max)
     }
 

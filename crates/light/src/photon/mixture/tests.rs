@@ -28,13 +28,13 @@ fn off(glints: &[Glint], echoes: &[Echo]) -> f64 {
         let time_fs = first - 6.0 * SIGMA_FS + width_fs * f64::from(step) / 2000.0;
         let exact: f64 = glints
             .iter()
-            .map(|glint| glint.photons * below((time_fs - glint.arrival_fs) / SIGMA_FS))
+            .map(|glint| glint.photons * normal_cdf((time_fs - glint.arrival_fs) / SIGMA_FS))
             .sum();
         let given: f64 = echoes
             .iter()
             .map(|echo| {
                 let sigma_fs = echo.sigma.unwrap().as_fs() as f64;
-                echo.photons * below((time_fs - echo.arrival.as_fs() as f64) / sigma_fs)
+                echo.photons * normal_cdf((time_fs - echo.arrival.as_fs() as f64) / sigma_fs)
             })
             .sum();
         (exact - given).abs() / all
@@ -92,7 +92,8 @@ fn slices_of_a_slanted_surface_have_a_flat_top() {
         let before = |z: f64| -> f64 {
             let share = |echo: &Echo| {
                 let sigma_fs = echo.sigma.unwrap().as_fs() as f64;
-                echo.photons * below((z * SIGMA_FS + 4e8 - echo.arrival.as_fs() as f64) / sigma_fs)
+                echo.photons
+                    * normal_cdf((z * SIGMA_FS + 4e8 - echo.arrival.as_fs() as f64) / sigma_fs)
             };
             echoes.iter().map(share).sum::<f64>() / 64.0
         };
@@ -191,12 +192,12 @@ proptest! {
         let photons: f64 = echoes.iter().map(|echo| echo.photons).sum();
         let sent: f64 = glints.iter().map(|glint| glint.photons).sum();
         prop_assert!((photons / sent - 1.0).abs() < 1e-12);
-        let mean = |of: &dyn Fn(f64, f64) -> f64| -> [f64; 2] {
+        let mean = |moment: &dyn Fn(f64, f64) -> f64| -> [f64; 2] {
             let echo = echoes.iter().map(|e| {
                 let sigma = e.sigma.unwrap().as_fs() as f64 / SIGMA_FS;
-                e.photons * of(e.arrival.as_fs() as f64 / SIGMA_FS - 400.0, sigma * sigma)
+                e.photons * moment(e.arrival.as_fs() as f64 / SIGMA_FS - 400.0, sigma * sigma)
             });
-            let glint = glints.iter().map(|g| g.photons * of(g.arrival_fs / SIGMA_FS - 400.0, 1.0));
+            let glint = glints.iter().map(|g| g.photons * moment(g.arrival_fs / SIGMA_FS - 400.0, 1.0));
             [echo.sum::<f64>() / sent, glint.sum::<f64>() / sent]
         };
         for of in [&|z: f64, _: f64| z, &|z: f64, own: f64| z * z + own] as [&dyn Fn(f64, f64) -> f64; 2] {

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::photon::{
-    CROSSTALK_DELAY, DeadTimeLaw, EchoLaw, GROUP, Group, PulseShape, SpadGrid, SpadModel,
+    CROSSTALK_DELAY, CycleGroup, DeadTimeLaw, EchoLaw, GROUP, PulseShape, SpadGrid, SpadModel,
     StreamConfig,
 };
 use crate::units::Frequency;
@@ -160,11 +160,11 @@ fn a_measured_pulse_adds_to_the_jitter() {
     // The convolution, summed over slices of the pulse.
     let slices = 2000;
     let d = kolmogorov(late.collect(), |x| {
-        let at = |i: i32| Time::from_fs(8_000_000 / i64::from(slices) * i64::from(i));
+        let slice_start = |i: i32| Time::from_fs(8_000_000 / i64::from(slices) * i64::from(i));
         (0..slices)
             .map(|i| {
-                let mass = shape.cumulative(at(i + 1)) - shape.cumulative(at(i));
-                let middle = (at(i) + at(i + 1)).as_ns() / 2.0;
+                let mass = shape.cumulative(slice_start(i + 1)) - shape.cumulative(slice_start(i));
+                let middle = (slice_start(i) + slice_start(i + 1)).as_ns() / 2.0;
                 mass * libm::erfc(-(x - middle) / 1.7 / 2f64.sqrt()) / 2.0
             })
             .sum()
@@ -200,14 +200,14 @@ fn any_part_can_be_drawn_alone() {
 
 #[test]
 fn a_longer_exposure_begins_with_the_same_photons() {
-    let of = |laser_cycles| {
+    let events = |laser_cycles| {
         let config = StreamConfig {
             laser_cycles,
             ..config()
         };
         PhotonStream::new(&config).pixel_events(5, &LIGHT).events
     };
-    let (short, long) = (of(700), of(1500));
+    let (short, long) = (events(700), events(1500));
     assert_eq!(short, long[..short.len()]);
 }
 
@@ -292,7 +292,7 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
         let parts = stream.parts(pixel, &light);
         let pixel = &parts[0];
         pixel.draw(
-            Group::of_cycle(group * GROUP, SpadGrid::default()),
+            CycleGroup::of_cycle(group * GROUP, SpadGrid::default()),
             &stream.span(slot..slot + 1),
             &mut draw,
         );
@@ -324,7 +324,7 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
 }
 
 /// Fraction of photons that make edges at this rate per SPAD, in cycles much shorter than the dead time.
-fn seen(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
+fn edge_share(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
     let config = StreamConfig {
         clock: Frequency::from_hz(100_000_000),
         stop_periods: 2,
@@ -345,8 +345,8 @@ fn seen(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
 fn dead_time_carries_over_from_cycle_to_cycle_by_either_law() {
     for load in [0.2, 1.0, 5.0] {
         let hz = load / 100e-9;
-        let non_paralysable = seen(DeadTimeLaw::NonParalysable, hz) * (1.0 + load);
-        let paralysable = seen(DeadTimeLaw::Paralysable, hz) / (-load).exp();
+        let non_paralysable = edge_share(DeadTimeLaw::NonParalysable, hz) * (1.0 + load);
+        let paralysable = edge_share(DeadTimeLaw::Paralysable, hz) / (-load).exp();
         assert!((non_paralysable - 1.0).abs() < 0.05, "{non_paralysable}");
         assert!((paralysable - 1.0).abs() < 0.12, "{paralysable}");
     }

@@ -30,7 +30,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::part::{Kind, PixelStream};
+use super::part::{PhotonKind, PixelStream};
 use crate::numerics::branchless;
 use crate::photon::philox::{LANES, blocks_from};
 use crate::photon::spad::Photon;
@@ -68,7 +68,7 @@ fn uniform(word: u32) -> f64 {
 }
 
 /// A block of background photons of [`TILE`] successive laser cycles, some photons of each at a time.
-pub struct Background<'a> {
+pub struct BackgroundBlock<'a> {
     pixel: &'a PixelStream<'a>,
     first_cycle: u32,
     block: u32,
@@ -91,7 +91,7 @@ pub fn spad_of(word: u32, spads: usize) -> usize {
     word as usize & (spads - 1)
 }
 
-impl Background<'_> {
+impl BackgroundBlock<'_> {
     /// Draws the next photons of all cycles. False where none of them has another one; then there are no photons.
     #[inline]
     pub fn draw(&mut self) -> bool {
@@ -198,7 +198,7 @@ impl<'a> PixelStream<'a> {
     pub fn has_ordered_echo(&self) -> bool {
         let is_gaussian = self.shape.is_none();
         let is_short = self.echo_fs.1 - self.echo_fs.0 < self.stream.cycle_fs / 2;
-        let is_plain = self.kind == Kind::Plain;
+        let is_plain = self.kind == PhotonKind::Plain;
         let is_drawn_so = self.is_bright && self.is_alone && is_plain;
         is_drawn_so && is_gaussian && is_short && self.signal_per_spad > 0.0
     }
@@ -222,7 +222,7 @@ impl<'a> PixelStream<'a> {
     pub fn block_at(&self, time_fs: i64) -> u32 {
         let ends_fs = self.stream.ends_fs();
         let slots = self.stream.slots;
-        let slot = slots.at(time_fs.clamp(ends_fs.start, ends_fs.end - 1));
+        let slot = slots.slot_at(time_fs.clamp(ends_fs.start, ends_fs.end - 1));
         slot.min(slots.count - 1) / BLOCK_SLOTS
     }
 
@@ -245,10 +245,10 @@ impl<'a> PixelStream<'a> {
 
     /// A block of background photons in [`TILE`] laser cycles from `first_cycle` on; those that come later than `until_fs`
     /// after the start of the cycle may be missing.
-    pub fn background(&self, first_cycle: u32, block: u32, until_fs: i64) -> Background<'_> {
+    pub fn background(&self, first_cycle: u32, block: u32, until_fs: i64) -> BackgroundBlock<'_> {
         let block_fs = self.block_fs(block);
         let length = (block_fs.end - block_fs.start) as f64;
-        Background {
+        BackgroundBlock {
             pixel: self,
             first_cycle,
             block,
@@ -299,7 +299,7 @@ impl<'a> PixelStream<'a> {
                     self.keeps_background(cycle, spad, time_fs, share, words)
                 };
                 if time >= Time::ZERO && is_kept {
-                    photons.push(Photon::new(time, spad, self.kind == Kind::Breeding));
+                    photons.push(Photon::new(time, spad, self.kind == PhotonKind::Breeding));
                 }
             }
         }

@@ -5,10 +5,10 @@
 
 use super::draw::Draw;
 use super::exposure::Span;
-use super::group::{GROUP, Group, Place};
+use super::group::{CycleGroup, GROUP, GroupPlace};
 use super::numbers::Counts;
 use super::part::{PixelStream, nearest};
-use crate::photon::random::Purpose;
+use crate::photon::random::RandomPurpose;
 use crate::photon::spad_grid::MOST_SPADS;
 
 /// Second counter word of the number of signal photons; slots are below it.
@@ -16,9 +16,9 @@ const SIGNAL_RUN: u32 = u32::MAX;
 
 impl PixelStream<'_> {
     /// Draws all photons of `group` in a part of its cycles.
-    pub fn draw(&self, group: Group, span: &Span, draw: &mut Draw) {
+    pub fn draw(&self, group: CycleGroup, span: &Span, draw: &mut Draw) {
         let key = self.key;
-        let numbered = |purpose: Purpose| purpose as u32 | group.number() << 8;
+        let numbered = |purpose: RandomPurpose| purpose as u32 | group.number() << 8;
         debug_assert!(!self.is_bright, "bright light is drawn by laser cycle");
         draw.begin(group);
         if self
@@ -35,8 +35,8 @@ impl PixelStream<'_> {
             return;
         }
         draw.within_fs = span.within_fs.clone();
-        let (background, parts) = self.background.of(group);
-        let (signal, signal_parts) = self.signal.of(group);
+        let (background, parts) = self.background.distribution(group);
+        let (signal, signal_parts) = self.signal.distribution(group);
         let has_echo = !signal.is_zero()
             && !draw.within_fs.is_empty()
             && self.echo_fs.0 < draw.within_fs.end
@@ -83,7 +83,7 @@ impl PixelStream<'_> {
     /// Place of an echo's photon of this number in `draw` ([`Draw::half_an_echo`]), and its time after the start of its
     /// cycle, fs.
     #[inline]
-    pub fn signal_photon(&self, draw: &Draw, number: usize) -> (Place, i64) {
+    pub fn signal_photon(&self, draw: &Draw, number: usize) -> (GroupPlace, i64) {
         let word = draw.echo_word(number);
         let mut after_fs = self.gaussian.draw(word);
         if let Some(shape) = &self.shape {
@@ -101,7 +101,7 @@ impl Draw {
         &self,
         pixel: &PixelStream<'_>,
         cycles: u32,
-    ) -> impl Iterator<Item = (Place, i64)> {
+    ) -> impl Iterator<Item = (GroupPlace, i64)> {
         let words = self.words();
         let slots = pixel.slots();
         // Short exposures need few of a group's photons; only of those the times are worked out.
@@ -210,7 +210,7 @@ impl ByCycle {
         }
     }
 
-    pub(in crate::photon) fn of(&self, cycle: u32) -> &[i64] {
+    pub(in crate::photon) fn cycle_photons(&self, cycle: u32) -> &[i64] {
         let cycle = cycle as usize;
         let start = cycle.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.photons[start..self.ends[cycle]]

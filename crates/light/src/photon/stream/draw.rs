@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::group::{Group, Place};
+use super::group::{CycleGroup, GroupPlace};
 use crate::photon::philox::{Blocks, LANES};
 
 /// Photons that one block of random words makes.
@@ -10,7 +10,7 @@ pub const PER_BLOCK: usize = 4;
 
 /// Background photons of one slot: first those of its blocks' first words, then those of their second ones, and so on.
 #[derive(Debug, Clone, Copy)]
-pub struct Run {
+pub struct SlotRun {
     /// The slot.
     pub slot: u32,
     /// Its first block.
@@ -19,7 +19,7 @@ pub struct Run {
     pub photons: u32,
 }
 
-impl Run {
+impl SlotRun {
     /// Its last block, and how many words of that make photons; any if there is no photon.
     #[inline]
     pub fn last_block(&self) -> (usize, usize) {
@@ -45,23 +45,23 @@ pub struct Draw {
     pub(super) background: Blocks,
     pub(super) echo: Blocks,
     /// Background photons by slot.
-    pub runs: Vec<Run>,
+    pub runs: Vec<SlotRun>,
     /// Photons of the whole echo.
     pub(super) echo_photons: usize,
     /// What the drawn slots are, fs after the start of the cycle.
     pub(super) within_fs: Range<i64>,
     /// The group.
-    pub group: Group,
+    pub group: CycleGroup,
     pub(super) photons: usize,
     /// Photons of the exposure.
     of_exposure: usize,
     /// Photons that were left when some were thinned out.
-    pub(super) kept: Vec<(Place, i64)>,
+    pub(super) kept: Vec<(GroupPlace, i64)>,
 }
 
 impl Draw {
     /// Forgets all photons, and makes room for those of a group.
-    pub(super) fn begin(&mut self, group: Group) {
+    pub(super) fn begin(&mut self, group: CycleGroup) {
         self.runs.clear();
         self.counts.clear();
         self.background.clear();
@@ -86,7 +86,7 @@ impl Draw {
     /// Asks for background photons of a slot.
     #[inline]
     pub(super) fn push_run(&mut self, slot: u32, photons: u32) {
-        self.runs.push(Run {
+        self.runs.push(SlotRun {
             slot,
             first_block: self.background.len() as u32,
             photons,
@@ -130,7 +130,7 @@ impl Draw {
     }
 
     /// A random word for every background photon, by rows of their blocks' first, second, … words: [`Slots::time_fs`] of
-    /// the slot's number and the word, and [`Group::place`] of the word. Behind those of the last block comes what
+    /// the slot's number and the word, and [`CycleGroup::place`] of the word. Behind those of the last block comes what
     /// fills the rows up.
     ///
     /// [`Slots::time_fs`]: super::Slots::time_fs
@@ -143,7 +143,7 @@ impl Draw {
         self.background.seconds()
     }
 
-    /// The random words of the echo's photons, low and high, by halves: [`Group::place`] of the high word, and
+    /// The random words of the echo's photons, low and high, by halves: [`CycleGroup::place`] of the high word, and
     /// [`PixelStream::signal_photon`](super::PixelStream::signal_photon). Some may come outside [`Draw::within_fs`], and are no photons of these slots. Behind
     /// [`Draw::echo_photons`] of either half comes what fills it up to a multiple of [`LANES`].
     pub fn echo(&self) -> [[&[u32]; 2]; 2] {

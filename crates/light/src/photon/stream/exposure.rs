@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use super::group::Group;
+use super::group::CycleGroup;
 use super::schedule::Schedule;
 use super::slot::Slots;
 use crate::photon::light::{OtherLaser, PixelLight};
@@ -90,7 +90,7 @@ impl PhotonStream {
     /// Start of laser cycle `cycle`, exact to the femtosecond.
     #[inline]
     pub fn cycle_start(&self, cycle: u32) -> Time {
-        self.starts.at(cycle)
+        self.starts.time(cycle)
     }
 
     /// When the photons of a cycle begin and end, fs after its start.
@@ -117,8 +117,8 @@ impl PhotonStream {
     }
 
     /// Groups of the exposure; the last one may outlast it.
-    pub fn groups(&self) -> impl Iterator<Item = Group> + use<> {
-        Group::until(self.config.laser_cycles, self.config.spads.grid)
+    pub fn groups(&self) -> impl Iterator<Item = CycleGroup> + use<> {
+        CycleGroup::groups_until(self.config.laser_cycles, self.config.spads.grid)
     }
 }
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::exposure::PhotonStream;
-use super::group::{Group, Place};
+use super::group::{CycleGroup, GroupPlace};
 use super::part::{PixelStream, nearest};
 use super::schedule::Schedule;
 use crate::photon::light::{MOST_PER_PULSE, PixelLight, PulseTrain};
@@ -32,7 +32,7 @@ pub(super) struct Foreign {
 
 impl Foreign {
     /// Those of a train, and how many of its `photons` a pulse are drawn. No photon comes farther than `reach_fs` from its pulse's centre.
-    pub(super) fn of(
+    pub(super) fn new(
         train: &PulseTrain,
         stream: &PhotonStream,
         photons: f64,
@@ -100,9 +100,9 @@ impl PixelStream<'_> {
     pub(super) fn push_foreign(
         &self,
         foreign: &Foreign,
-        group: Group,
+        group: CycleGroup,
         slots: Range<u32>,
-        kept: &mut Vec<(Place, i64)>,
+        kept: &mut Vec<(GroupPlace, i64)>,
     ) {
         let (stream, all) = (self.stream, self.stream.slots);
         if slots.is_empty() {
@@ -209,7 +209,7 @@ impl PixelStream<'_> {
                 continue;
             }
             // As far from the ends of its slot as background photons.
-            let slot = slots.at(time_fs).min(slots.count - 1);
+            let slot = slots.slot_at(time_fs).min(slots.count - 1);
             let (start_fs, margin_fs) = (slots.start_fs(slot), slots.margin_fs());
             let last_fs = start_fs + slots.length_fs() - margin_fs - 1;
             let time_fs = time_fs.clamp(start_fs + margin_fs, last_fs);

@@ -23,30 +23,30 @@ const GROUP_BITS: u32 = 11;
 pub(super) const FIRST: u32 = 1 << FIRST_BITS;
 const FIRST_BITS: u32 = 7;
 
-/// Where in its group a photon falls: cycle within the group and, in the lowest bits, SPAD ([`Group::split`]).
-pub type Place = u16;
+/// Where in its group a photon falls: cycle within the group and, in the lowest bits, SPAD ([`CycleGroup::split`]).
+pub type GroupPlace = u16;
 
-/// Most bits of a [`Place`], the highest ones of a random word: 2048 cycles and 16 SPADs.
+/// Most bits of a [`GroupPlace`], the highest ones of a random word: 2048 cycles and 16 SPADs.
 pub const PLACE_BITS: u32 = GROUP_BITS + 4;
 
 const _: () = assert!(PLACE_BITS + TIME_BITS <= u32::BITS);
 
 /// A group of laser cycles, 2ᵏ of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Group {
+pub struct CycleGroup {
     number: u32,
     first_cycle: u32,
     bits: u32,
     spad_bits: u32,
 }
 
-impl Default for Group {
+impl Default for CycleGroup {
     fn default() -> Self {
-        Group::of_cycle(0, SpadGrid::default())
+        CycleGroup::of_cycle(0, SpadGrid::default())
     }
 }
 
-impl Group {
+impl CycleGroup {
     /// Bits of the longest groups' cycles.
     fn longest_bits(spad_bits: u32) -> u32 {
         GROUP_BITS.min(PLACE_BITS - spad_bits)
@@ -62,7 +62,7 @@ impl Group {
             0 => 0,
             _ => bits - FIRST_BITS,
         };
-        Group {
+        CycleGroup {
             number: shorter + (first_cycle >> bits),
             first_cycle,
             bits,
@@ -74,7 +74,7 @@ impl Group {
     pub(crate) fn long(cycle: u32, grid: SpadGrid) -> Self {
         let spad_bits = grid.bits();
         let bits = Self::longest_bits(spad_bits);
-        Group {
+        CycleGroup {
             number: cycle >> bits,
             first_cycle: cycle >> bits << bits,
             bits,
@@ -83,10 +83,10 @@ impl Group {
     }
 
     /// All groups that begin before laser cycle `end`.
-    pub(crate) fn until(end: u32, grid: SpadGrid) -> impl Iterator<Item = Self> {
+    pub(crate) fn groups_until(end: u32, grid: SpadGrid) -> impl Iterator<Item = Self> {
         let mut next = Some(0);
         std::iter::from_fn(move || {
-            let group = Group::of_cycle(next.filter(|&first| first < end)?, grid);
+            let group = CycleGroup::of_cycle(next.filter(|&first| first < end)?, grid);
             next = group.first_cycle.checked_add(group.cycles());
             Some(group)
         })
@@ -127,18 +127,18 @@ impl Group {
 
     /// The place of a photon.
     #[inline]
-    pub fn place(self, word: u32) -> Place {
-        (word >> self.place_shift()) as Place
+    pub fn place(self, word: u32) -> GroupPlace {
+        (word >> self.place_shift()) as GroupPlace
     }
 
     /// The place of a SPAD in a cycle within the group.
-    pub(super) fn place_of(self, cycle: u32, spad: u8) -> Place {
-        (cycle << self.spad_bits) as Place | Place::from(spad)
+    pub(super) fn place_of(self, cycle: u32, spad: u8) -> GroupPlace {
+        (cycle << self.spad_bits) as GroupPlace | GroupPlace::from(spad)
     }
 
     /// The cycle within the group, and the SPAD, of a place.
     #[inline]
-    pub fn split(self, place: Place) -> (u32, u8) {
+    pub fn split(self, place: GroupPlace) -> (u32, u8) {
         let spad = place & ((1 << self.spad_bits) - 1);
         (u32::from(place >> self.spad_bits), spad as u8)
     }
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn lengths_double_up_to_the_longest() {
-        let groups: Vec<_> = Group::until(4097, SpadGrid::default())
+        let groups: Vec<_> = CycleGroup::groups_until(4097, SpadGrid::default())
             .map(|group| (group.first_cycle(), group.cycles()))
             .collect();
         let expected = [
@@ -164,8 +164,11 @@ mod tests {
             (4096, 2048),
         ];
         assert_eq!(groups, expected);
-        assert_eq!(Group::until(0, SpadGrid::default()).count(), 0);
-        assert_eq!(Group::until(129, SpadGrid::default()).count(), 2);
+        assert_eq!(CycleGroup::groups_until(0, SpadGrid::default()).count(), 0);
+        assert_eq!(
+            CycleGroup::groups_until(129, SpadGrid::default()).count(),
+            2
+        );
     }
 
     proptest! {
@@ -177,13 +180,13 @@ mod tests {
             word: u32,
         ) {
             let grid = SpadGrid::new(1 << side, 1 << other);
-            let group = Group::of_cycle(cycle, grid);
+            let group = CycleGroup::of_cycle(cycle, grid);
             prop_assert!(cycle - group.first_cycle() < group.cycles());
-            prop_assert_eq!(Group::of_cycle(group.first_cycle(), grid), group);
+            prop_assert_eq!(CycleGroup::of_cycle(group.first_cycle(), grid), group);
             let last = group.first_cycle() + (group.cycles() - 1);
-            prop_assert_eq!(Group::of_cycle(last, grid), group);
+            prop_assert_eq!(CycleGroup::of_cycle(last, grid), group);
             if let Some(next) = last.checked_add(1) {
-                prop_assert_eq!(Group::of_cycle(next, grid).number(), group.number() + 1);
+                prop_assert_eq!(CycleGroup::of_cycle(next, grid).number(), group.number() + 1);
             }
             prop_assert!([128, 256, 512, 1024, 2048].contains(&group.cycles()));
             prop_assert!(group.number() < 1 << 24, "the counter has 24 bits for it");

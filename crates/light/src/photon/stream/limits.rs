@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::exposure::PhotonStream;
-use super::group::Group;
+use super::group::CycleGroup;
 use crate::photon::light::{Layer, Profile};
-use crate::photon::random::Purpose;
+use crate::photon::random::RandomPurpose;
 use crate::units::Time;
 
 /// What is kept of a layer.
@@ -24,7 +24,7 @@ pub(super) struct Limits {
 
 impl Limits {
     /// Those of a layer; `None` if all of it is kept.
-    pub(super) fn of(layer: &Layer<'_>, stream: &PhotonStream) -> Option<Self> {
+    pub(super) fn from_layer(layer: &Layer<'_>, stream: &PhotonStream) -> Option<Self> {
         let laser_cycles = stream.config.laser_cycles;
         let cycles = layer.cycles.start.min(laser_cycles)..layer.cycles.end.min(laser_cycles);
         let has_energies = stream.config.energy_spread > 0.0
@@ -53,13 +53,13 @@ impl Limits {
     }
 
     /// Whether no photon of a group is kept.
-    pub(super) fn is_outside(&self, group: Group) -> bool {
+    pub(super) fn is_outside(&self, group: CycleGroup) -> bool {
         let (drawn, first) = (self.drawn(), group.first_cycle());
         drawn.end <= first || drawn.start.saturating_sub(first) >= group.cycles()
     }
 
     /// Whether all photons of a group's laser cycles within the exposure are kept: slots of its first one may begin before it.
-    pub(super) fn keep_all_of(&self, group: Group, stream: &PhotonStream) -> bool {
+    pub(super) fn keep_all_of(&self, group: CycleGroup, stream: &PhotonStream) -> bool {
         let Range { start, end } = self.cycles;
         let first = group.first_cycle();
         let begins_before = start == 0 || start < first;
@@ -74,7 +74,7 @@ impl Limits {
         if !self.has_energies {
             return 1.0;
         }
-        let counter = [cycle, 0, 0, Purpose::PulseEnergy as u32];
+        let counter = [cycle, 0, 0, RandomPurpose::PulseEnergy as u32];
         let word = rand_philox::philox4x32_10(counter, stream.key)[0];
         let greatest = stream.config.greatest_energy();
         let least = 2.0 - greatest;

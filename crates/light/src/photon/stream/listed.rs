@@ -41,7 +41,7 @@ impl ListedEchoes {
 
     /// The photons of one laser cycle's echo of `light`, in no particular order, where they do not depend on the SPADs' states; those
     /// before or after the exposure are none.
-    pub fn of(&mut self, light: &PixelStream<'_>, cycle: u32) -> &[Photon] {
+    pub fn photons(&mut self, light: &PixelStream<'_>, cycle: u32) -> &[Photon] {
         if !light.has_listed_echo() {
             return &[];
         }
@@ -65,7 +65,7 @@ impl ListedEchoes {
                 self.photons[(stray.cycle - first_cycle) as usize].push(Photon::new(
                     stream.cycle_start(stray.cycle) + Time::from_fs(stray.time_fs),
                     stray.spad,
-                    light.breeds(),
+                    light.has_secondaries(),
                 ));
             });
             return;
@@ -113,7 +113,7 @@ impl ListedEchoes {
                 let cycle = first_cycle + lane as u32;
                 if (Time::ZERO..end).contains(&time) && light.keeps_signal(cycle, spad, [low, high])
                 {
-                    self.photons[lane].push(Photon::new(time, spad, light.breeds()));
+                    self.photons[lane].push(Photon::new(time, spad, light.has_secondaries()));
                 }
             }
         }
@@ -172,7 +172,7 @@ mod tests {
             let spad = (u64::from(high) >> (u32::BITS - config.spads.grid.bits())) as u8;
             let is_one =
                 time >= Time::ZERO && time < end && light.keeps_signal(cycle, spad, [low, high]);
-            is_one.then(|| Photon::new(time, spad, light.breeds()))
+            is_one.then(|| Photon::new(time, spad, light.has_secondaries()))
         };
         (0..number.sum::<u32>()).filter_map(photon).collect()
     }
@@ -208,7 +208,7 @@ mod tests {
             for part in stream.parts(pixel, &light) {
                 let mut listed = ListedEchoes::default();
                 for &cycle in &asked {
-                    prop_assert_eq!(listed.of(&part, cycle), &one_by_one(&part, cycle)[..]);
+                    prop_assert_eq!(listed.photons(&part, cycle), &one_by_one(&part, cycle)[..]);
                 }
             }
         }

@@ -4,7 +4,7 @@ use std::cell::{OnceCell, RefCell};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::group::{FIRST, Group};
+use super::group::{CycleGroup, FIRST};
 use crate::photon::philox::Blocks;
 use crate::photon::random::Poisson;
 
@@ -63,7 +63,7 @@ impl Numbers {
     }
 
     /// A distribution, and how many draws of it make the number in this group.
-    pub(super) fn of(&self, group: Group) -> (&Poisson, u32) {
+    pub(super) fn distribution(&self, group: CycleGroup) -> (&Poisson, u32) {
         let (cell, cycles) = if group.cycles() == group.longest() {
             (&self.long, group.longest())
         } else {

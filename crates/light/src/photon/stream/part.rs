@@ -11,14 +11,14 @@ use smallvec::SmallVec;
 
 use super::exposure::{FAR_FS, PhotonStream, Span, sampler};
 use super::foreign::Foreign;
-use super::group::{FIRST, Group, PLACE_BITS};
+use super::group::{CycleGroup, FIRST, PLACE_BITS};
 use super::limits::Limits;
 use super::numbers::Numbers;
 use super::slot::Slots;
 use crate::photon::light::{Layer, PixelLight};
 use crate::photon::pulse::PulseSampler;
 use crate::photon::quantile::{NORMAL_BITS, NormalSampler};
-use crate::photon::random::{Purpose, layer_key};
+use crate::photon::random::{RandomPurpose, layer_key};
 use crate::photon::spad::{FEW_SPADS, Photon, SpadEvent};
 use crate::units::Time;
 
@@ -44,7 +44,7 @@ pub struct PixelStream<'a> {
     pub(in crate::photon) pixel: u32,
     /// Of its SPADs, where they differ.
     pub(in crate::photon) dead_times: SmallVec<[Time; FEW_SPADS]>,
-    pub(super) kind: Kind,
+    pub(super) kind: PhotonKind,
     /// All parts of a macropixel's light are, or none is.
     pub is_bright: bool,
     /// Whether the light has one layer, all photons of which are kept.
@@ -73,7 +73,7 @@ pub struct PixelStream<'a> {
 }
 
 /// Whether two ranges have something in common.
-fn meet(a: &Range<u32>, b: &Range<u32>) -> bool {
+fn overlap(a: &Range<u32>, b: &Range<u32>) -> bool {
     a.start.max(b.start) < a.end.min(b.end)
 }
 
@@ -99,8 +99,11 @@ impl PhotonStream {
             if number > 0 && layer.background_hz == 0.0 && layer.signal_per_cycle == 0.0 {
                 continue;
             }
-            for (kind, share) in [(Kind::Plain, 1.0 - breeding), (Kind::Breeding, breeding)] {
-                if kind == Kind::Plain || share > 0.0 {
+            for (kind, share) in [
+                (PhotonKind::Plain, 1.0 - breeding),
+                (PhotonKind::Breeding, breeding),
+            ] {
+                if kind == PhotonKind::Plain || share > 0.0 {
                     let mut part = self.part(pixel, &layer, kind, share);
                     (part.key, part.is_bright) = (key, is_bright);
                     part.is_alone = light.is_plain() && self.config.energy_spread == 0.0;
@@ -113,7 +116,7 @@ impl PhotonStream {
 
     /// One part of a layer of light: the photons of `kind`, which are `share` of all. Of a light's only layer, in dim light;
     /// [`PhotonStream::parts`] says what else it is.
-    fn part(&self, pixel: u32, layer: &Layer<'_>, kind: Kind, share: f64) -> PixelStream<'_> {
+    fn part(&self, pixel: u32, layer: &Layer<'_>, kind: PhotonKind, share: f64) -> PixelStream<'_> {
         let echo = layer.echo;
         let sigma = match layer.train {
             Some(train) => Some(train.sigma),
@@ -139,7 +142,7 @@ impl PhotonStream {
         let photons = layer.signal_per_cycle * greatest_energy * share;
         let foreign = layer
             .train
-            .map(|train| Foreign::of(train, self, photons, reach_fs));
+            .map(|train| Foreign::new(train, self, photons, reach_fs));
         let per_spad = match foreign {
             Some(_) => 0.0,
             None => photons / self.spads() as f64,
@@ -162,7 +165,7 @@ impl PhotonStream {
             kind,
             is_bright: false,
             is_alone: true,
-            limits: Limits::of(layer, self),
+            limits: Limits::from_layer(layer, self),
             gaussian,
             shape,
             foreign,
@@ -175,7 +178,7 @@ impl PhotonStream {
             signal: Numbers::new(drawn.unwrap_or(photons)),
             gap_fs: 1e15 / background_hz,
             signal_per_spad: per_spad,
-            has_long_groups: kind == Kind::Breeding
+            has_long_groups: kind == PhotonKind::Breeding
                 && background_hz * self.slots.length_s * f64::from(FIRST) < RARE,
             late_fs: 0,
         };
@@ -190,12 +193,12 @@ impl PhotonStream {
 
 impl PixelStream<'_> {
     /// The group of a laser cycle.
-    pub fn group_of(&self, cycle: u32) -> Group {
+    pub fn group_of(&self, cycle: u32) -> CycleGroup {
         let grid = self.stream.config.spads.grid;
         if self.has_long_groups {
-            Group::long(cycle, grid)
+            CycleGroup::long(cycle, grid)
         } else {
-            Group::of_cycle(cycle, grid)
+            CycleGroup::of_cycle(cycle, grid)
         }
     }
 
@@ -207,8 +210,8 @@ impl PixelStream<'_> {
     }
 
     /// Whether these are the photons whose avalanches trigger others.
-    pub fn breeds(&self) -> bool {
-        self.kind == Kind::Breeding
+    pub fn has_secondaries(&self) -> bool {
+        self.kind == PhotonKind::Breeding
     }
 
     /// The avalanches that a photon of the triggering kind causes, if it makes one itself.
@@ -300,46 +303,46 @@ pub(super) fn nearest(value: f64) -> i64 {
 
 /// Which photons of a macropixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum PhotonKind {
     /// Those whose avalanches cause no others.
     Plain,
     /// Those whose avalanches do.
     Breeding,
 }
 
-impl Kind {
-    pub(super) fn counts(self) -> Purpose {
+impl PhotonKind {
+    pub(super) fn counts(self) -> RandomPurpose {
         match self {
-            Kind::Plain => Purpose::PhotonCounts,
-            Kind::Breeding => Purpose::BreedingCounts,
+            PhotonKind::Plain => RandomPurpose::PhotonCounts,
+            PhotonKind::Breeding => RandomPurpose::BreedingCounts,
         }
     }
 
-    pub(super) fn background(self) -> Purpose {
+    pub(super) fn background(self) -> RandomPurpose {
         match self {
-            Kind::Plain => Purpose::Photons,
-            Kind::Breeding => Purpose::BreedingPhotons,
+            PhotonKind::Plain => RandomPurpose::Photons,
+            PhotonKind::Breeding => RandomPurpose::BreedingPhotons,
         }
     }
 
-    pub(super) fn echo(self) -> Purpose {
+    pub(super) fn echo(self) -> RandomPurpose {
         match self {
-            Kind::Plain => Purpose::Signal,
-            Kind::Breeding => Purpose::BreedingSignal,
+            PhotonKind::Plain => RandomPurpose::Signal,
+            PhotonKind::Breeding => RandomPurpose::BreedingSignal,
         }
     }
 
     pub(super) fn bright_background(self) -> u32 {
         match self {
-            Kind::Plain => Purpose::BrightPhotons as u32,
-            Kind::Breeding => Purpose::BrightBreedingPhotons as u32,
+            PhotonKind::Plain => RandomPurpose::BrightPhotons as u32,
+            PhotonKind::Breeding => RandomPurpose::BrightBreedingPhotons as u32,
         }
     }
 
     pub(super) fn bright_echo(self) -> u32 {
         match self {
-            Kind::Plain => Purpose::BrightSignal as u32,
-            Kind::Breeding => Purpose::BrightBreedingSignal as u32,
+            PhotonKind::Plain => RandomPurpose::BrightSignal as u32,
+            PhotonKind::Breeding => RandomPurpose::BrightBreedingSignal as u32,
         }
     }
 }
@@ -368,13 +371,13 @@ impl PixelStream<'_> {
     /// Whether some of these laser cycles may have background photons that are kept.
     pub fn has_background_in(&self, cycles: &Range<u32>) -> bool {
         let limits = self.limits.as_ref();
-        self.gap_fs.is_finite() && limits.is_none_or(|limits| meet(&limits.drawn(), cycles))
+        self.gap_fs.is_finite() && limits.is_none_or(|limits| overlap(&limits.drawn(), cycles))
     }
 
     /// Whether photons of the echoes of some of these laser cycles may be kept.
     pub(super) fn has_echo_in(&self, cycles: &Range<u32>) -> bool {
         let limits = self.limits.as_ref();
-        limits.is_none_or(|limits| meet(&limits.cycles, cycles))
+        limits.is_none_or(|limits| overlap(&limits.cycles, cycles))
     }
 
     /// Whether photons of the echo of a laser cycle may be kept.
@@ -439,7 +442,7 @@ impl PixelStream<'_> {
         if chance >= 1.0 {
             return true;
         }
-        let counter = [first, second, self.pixel, Purpose::Thinning as u32];
+        let counter = [first, second, self.pixel, RandomPurpose::Thinning as u32];
         let word = rand_philox::philox4x32_10(counter, self.key)[0];
         f64::from(word) < chance * 2f64.powi(32)
     }

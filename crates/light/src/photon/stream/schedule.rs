@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use super::exposure::PhotonStream;
 use crate::photon::light::OtherLaser;
-use crate::photon::random::{Purpose, random_stream};
+use crate::photon::random::{RandomPurpose, random_stream};
 
 /// Pulses that were sent so long before an exposure may still arrive in it: 15 km away.
 const LONGEST_DELAY_S: f64 = 50e-6;
@@ -34,7 +34,8 @@ impl Schedule {
     /// That of `laser` beside the laser cycles of `stream`.
     pub(super) fn new(laser: &OtherLaser, stream: &PhotonStream) -> Self {
         let (seed, cycles) = (stream.config.seed, stream.config.laser_cycles);
-        let words = |number: u32, what: u32| random_stream(seed, Purpose::OtherLaser, number, what);
+        let words =
+            |number: u32, what: u32| random_stream(seed, RandomPurpose::OtherLaser, number, what);
         let unit = |word: u32| rand_philox::u32_to_unit_f64(word);
         let mut waited_fs = Vec::new();
         let longest_wait_fs = (laser.own_dither_s * 1e15) as i64;

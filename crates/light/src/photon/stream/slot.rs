@@ -72,7 +72,7 @@ impl Slots {
     }
 
     /// The slot that is running `time_fs` after the start of its cycle, no earlier than the first one begins.
-    pub fn at(&self, time_fs: i64) -> u32 {
+    pub fn slot_at(&self, time_fs: i64) -> u32 {
         let into_fs = time_fs + self.lead_fs;
         debug_assert!(into_fs >= 0);
         let length = u128::from(self.whole_fs) << 32 | u128::from(self.fraction >> 32);
@@ -121,12 +121,12 @@ mod tests {
                 let edge = clock.whole_fs(i64::from(slot)) - lead.as_fs();
                 prop_assert!((edge - 1..=edge).contains(&start));
             }
-            prop_assert_eq!(slots.at(start), slot);
-            prop_assert_eq!(slots.at(end - 1), slot);
+            prop_assert_eq!(slots.slot_at(start), slot);
+            prop_assert_eq!(slots.slot_at(end - 1), slot);
             let time = slots.time_fs(slot, word);
             let margin = slots.margin_fs();
             prop_assert!((start + margin..end - margin).contains(&time));
-            prop_assert_eq!(slots.at(time), slot);
+            prop_assert_eq!(slots.slot_at(time), slot);
         }
     }
 }

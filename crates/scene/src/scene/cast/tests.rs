@@ -162,14 +162,14 @@ proptest! {
         let Some(hit) = scene.hit(&ray(x, y)) else { return Ok(()) };
         prop_assert!((hit.normal.length() - 1.0).abs() < 1e-12);
         prop_assert!(hit.normal.dot(ray(x, y).direction) <= 0.0);
-        let point = ray(x, y).at(hit.range_m);
+        let point = ray(x, y).point(hit.range_m);
         for (dx, dy) in [(1e-6, 0.0), (0.0, 1e-6)] {
             let beside = ray(x + dx, y + dy);
             let Some(next) = scene.hit(&beside) else { continue };
             let same_face = (next.normal - hit.normal).length() < 1e-3;
             // Where a ray grazes, one step is no small one.
             if same_face && hit.normal.dot(ray(x, y).direction) < -0.1 {
-                let along = (beside.at(next.range_m) - point).normalize();
+                let along = (beside.point(next.range_m) - point).normalize();
                 prop_assert!(along.dot(hit.normal).abs() < 1e-3, "{along} {}", hit.normal);
             }
         }

@@ -247,17 +247,19 @@ fn the_commented_scene_reads_back_and_has_every_key() {
     let table = street.table();
     let mut keys: Vec<(String, String)> = Vec::new();
     for (section, value) in &table {
-        let of = |table: &Table| -> Vec<(String, String)> {
+        let section_keys = |table: &Table| -> Vec<(String, String)> {
             table
                 .keys()
                 .map(|key| (section.clone(), key.clone()))
                 .collect()
         };
         match value {
-            Value::Array(items) => {
-                keys.extend(items.iter().flat_map(|i| of(i.as_table().unwrap())))
-            }
-            value => keys.extend(of(value.as_table().unwrap())),
+            Value::Array(items) => keys.extend(
+                items
+                    .iter()
+                    .flat_map(|i| section_keys(i.as_table().unwrap())),
+            ),
+            value => keys.extend(section_keys(value.as_table().unwrap())),
         }
     }
     keys.sort();

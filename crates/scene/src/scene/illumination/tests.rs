@@ -150,7 +150,7 @@ fn what_moves_has_light_of_segments_and_the_rest_has_not() {
         .position(|o| o.name == "truck")
         .unwrap();
     scene.objects[truck].velocity_m_s = DVec3::new(0.0, 0.0, -15.0);
-    let truth = GroundTruth::render(&scene.at(0.1), 32, 32);
+    let truth = GroundTruth::render(&scene.snapshot(0.1), 32, 32);
     let moving = scene.light_during(&truth, &spads, 16_000, 12.5e-6);
     let mut seen = 0;
     for (pixel, (a, b)) in still.iter().zip(&moving).enumerate() {
@@ -267,7 +267,7 @@ fn crosstalk_of_an_echo_does_not_depend_on_one_before_it() {
     }
 }
 
-fn below(z: f64) -> f64 {
+fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
@@ -320,7 +320,7 @@ fn light_of_few_rays_is_close_to_that_of_very_many() {
         for step in 0..=steps {
             let time_fs = first + (last - first) * f64::from(step) / f64::from(steps);
             let early = |photons: f64, centre_fs: f64, sigma_fs: f64| {
-                photons * below((time_fs - centre_fs) / sigma_fs)
+                photons * normal_cdf((time_fs - centre_fs) / sigma_fs)
             };
             let all: f64 = exact
                 .iter()
@@ -342,13 +342,13 @@ fn light_of_few_rays_is_close_to_that_of_very_many() {
         off.push(worst);
     }
     off.sort_by(f64::total_cmp);
-    let at = |share: f64| off[(share * (off.len() - 1) as f64) as usize];
+    let quantile = |share: f64| off[(share * (off.len() - 1) as f64) as usize];
     println!(
         "median {:.4}, 90 % {:.4}, worst {:.4} of a macropixel's photons, {worst_photons:.4} of the brightest; {plain} of {} have one echo",
-        at(0.5),
-        at(0.9),
-        at(1.0),
+        quantile(0.5),
+        quantile(0.9),
+        quantile(1.0),
         off.len()
     );
-    assert!(at(0.5) < 0.002 && at(0.9) < 0.02 && worst_photons < 0.01);
+    assert!(quantile(0.5) < 0.002 && quantile(0.9) < 0.02 && worst_photons < 0.01);
 }

@@ -28,13 +28,13 @@ fn before_a_wall(reflectivity: f64, keys: &str) -> Scene {
 fn others(scene: &Scene, across: u32) -> Vec<Vec<PulseTrain>> {
     let truth = GroundTruth::render(scene, across, across);
     let budget = scene.photon_budget(across, across);
-    let of = |view: &std::sync::Arc<crate::scene::view::View>| {
+    let trains = |view: &std::sync::Arc<crate::scene::view::View>| {
         let others = view.others.iter();
         others
             .filter_map(|s| s.train(scene, &budget, 1.0))
             .collect()
     };
-    truth.views.iter().map(of).collect()
+    truth.views.iter().map(trains).collect()
 }
 
 #[test]
@@ -280,7 +280,7 @@ fn what_cannot_be_is_refused_in_one_sentence() {
 fn another_lidar_moves_with_the_world() {
     let mut scene = before_a_wall(0.3, "place_m = [0, 0, 30]\nvelocity_m_s = [1, 0, -10]");
     scene.rig.yaw_rate_deg_s = 30.0;
-    let later = &scene.at(3.0).interferers[0];
+    let later = &scene.snapshot(3.0).interferers[0];
     assert!(
         (later.place_m - DVec3::new(0.0, 0.0, 3.0)).length() < 1e-9,
         "{}",

@@ -41,10 +41,10 @@ impl Flat {
         }
     }
 
-    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let away_m = (self.centre_m - ray.origin).dot(self.normal);
         let range_m = in_front(away_m / ray.direction.dot(self.normal))?;
-        let point = ray.at(range_m);
+        let point = ray.point(range_m);
         // Most that miss are beyond the corners, which needs no edges.
         if 4.0 * (point - self.centre_m).length_squared() > self.reach_m2 {
             return None;

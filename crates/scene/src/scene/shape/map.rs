@@ -68,14 +68,14 @@ impl DepthMap {
     /// As [`Raster::read_map`]; a map without any surface; maps of different shape; reflectivities that are no shares.
     pub(crate) fn read(files: MapFiles) -> Result<Self, InputError> {
         let depth = Raster::read_map(&files.depth, files.unit_m, DEPTH_UNIT)?;
-        Self::of(files, depth)
+        Self::from_depths(files, depth)
     }
 
     /// A map whose depths, m, are at hand, 0 where nothing is; `files` says where they will stand, and which others are to be read.
     ///
     /// # Errors
     /// As `DepthMap::read`.
-    pub fn of(files: MapFiles, depth: Raster) -> Result<Self, InputError> {
+    pub fn from_depths(files: MapFiles, depth: Raster) -> Result<Self, InputError> {
         let (width, height) = (depth.width, depth.height);
         let complaint = |path: &Path, message: String| InputError::new(path.display(), message);
         let complain = |message: String| Err(complaint(&files.depth, message));
@@ -166,7 +166,7 @@ impl DepthMap {
     }
 
     /// Where a ray in the camera's coordinates first meets the map.
-    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let (origin, direction) = (ray.origin, ray.direction);
         if direction.z <= 0.0 {
             return None;
@@ -272,7 +272,7 @@ impl DepthMap {
         let pixel = self.pixel_of(point).and_then(|at| self.camera.pixel_at(at));
         let value = |raster: &Option<Raster>| {
             let ((row, col), raster) = (pixel?, raster.as_ref()?);
-            Some(f64::from(raster.at(row as usize, col as usize)))
+            Some(f64::from(raster.value(row as usize, col as usize)))
         };
         (value(&self.reflectivity), value(&self.grey))
     }
@@ -334,7 +334,7 @@ mod tests {
     const CAMERA: fn() -> PinholeCamera = || PinholeCamera::centred(50.0, 40, 30);
 
     /// What a camera sees of some shapes, along its axis.
-    fn seen(shapes: &[Shape], is_range: bool) -> Vec<f32> {
+    fn camera_depths(shapes: &[Shape], is_range: bool) -> Vec<f32> {
         let pixel = |at: usize| ((at % 40) as f64 + 0.5, (at / 40) as f64 + 0.5);
         let depth = |at: usize| {
             let ray = Ray::new(DVec3::ZERO, CAMERA().at_unit_depth(pixel(at)));
@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn from_beside_near_things_move_before_far_ones() {
         let shapes = [wall(4.0, 1.0, 0.0), wall(20.0, 1e3, 0.0)];
-        let map = read(&seen(&shapes, false), None, false).unwrap();
+        let map = read(&camera_depths(&shapes, false), None, false).unwrap();
         let origin = DVec3::new(0.5, 0.0, 0.0);
         let mut ends = (0, 0);
         for column in 0..40 {
@@ -416,7 +416,7 @@ mod tests {
                 .filter_map(|s| s.intersect(&ray))
                 .reduce(f64::min)
                 .unwrap();
-            let Some(Meeting { range_m, .. }) = map.meet(&ray) else {
+            let Some(Meeting { range_m, .. }) = map.intersect(&ray) else {
                 continue; // Beyond the map's edge.
             };
             ends.0 += u32::from((range_m - expected).abs() < 1e-3);
@@ -431,13 +431,13 @@ mod tests {
         #[test]
         fn planes_come_back(tilt in -0.8f64..0.8, z_m in 3.0f64..60.0, u in 8.0f64..32.0, v in 8.0f64..22.0, beside in -0.3f64..0.3, is_range: bool) {
             let plane = wall(z_m, 1e4, tilt);
-            let map = read(&seen(std::slice::from_ref(&plane), is_range), None, is_range).unwrap();
+            let map = read(&camera_depths(std::slice::from_ref(&plane), is_range), None, is_range).unwrap();
             for origin in [DVec3::ZERO, DVec3::new(beside, 0.3 * beside, -0.1)] {
                 let ray = Ray::new(origin, CAMERA().at_unit_depth((u, v)));
                 let expected = plane.intersect(&ray).unwrap();
-                let Meeting { range_m, .. } = map.meet(&ray).unwrap();
+                let Meeting { range_m, .. } = map.intersect(&ray).unwrap();
                 prop_assert!((range_m / expected - 1.0).abs() < 1e-5, "{range_m} {expected}");
-                let normal = map.normal_at(ray.at(range_m));
+                let normal = map.normal_at(ray.point(range_m));
                 prop_assert!(normal.dot(plane.placed().normal_at(DVec3::ZERO, 0)).abs() > 1.0 - 1e-4);
             }
         }

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use obvhs::aabb::Aabb;
 
-use self::listed::{CrossedFace, Listed};
+use self::listed::{CrossedFace, TriangleList};
 use self::tree::{Bounds, Tree};
 use super::meeting::{Meeting, NEAREST_M};
 use super::solid;
@@ -72,18 +72,18 @@ impl PartialEq for Mesh {
 }
 
 /// Counts the lines that are read through it, to say where a file is broken.
-struct Counted<R> {
+struct LineCounter<R> {
     inner: R,
     lines: usize,
 }
 
-impl<R: Read> Read for Counted<R> {
+impl<R: Read> Read for LineCounter<R> {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         self.inner.read(into)
     }
 }
 
-impl<R: BufRead> BufRead for Counted<R> {
+impl<R: BufRead> BufRead for LineCounter<R> {
     fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
         self.inner.fill_buf()
     }
@@ -119,7 +119,7 @@ impl Mesh {
             );
             return Err(complain(message));
         }
-        let mut reader = Counted {
+        let mut reader = LineCounter {
             inner: BufReader::new(file),
             lines: 0,
         };
@@ -135,9 +135,9 @@ impl Mesh {
         let lines = reader.lines;
         let (models, _) = loaded.map_err(|e| {
             let message = format!("is a broken OBJ here ({e}); save it again, with its triangles");
-            InputError::at(path.display(), lines.max(1), message)
+            InputError::at_line(path.display(), lines.max(1), message)
         })?;
-        let listed = Listed::of_models(models).map_err(|CrossedFace(at)| {
+        let listed = TriangleList::of_models(models).map_err(|CrossedFace(at)| {
             let message = format!(
                 "has a face that crosses itself, with a corner at {at:?}; cut its faces into triangles"
             );
@@ -163,10 +163,10 @@ impl Mesh {
             );
             return Err(complain(message));
         }
-        Ok(Mesh::of(path, listed))
+        Ok(Mesh::from_triangles(path, listed))
     }
 
-    fn of(path: &Path, listed: Listed) -> Self {
+    fn from_triangles(path: &Path, listed: TriangleList) -> Self {
         let corners = |triangle: [u32; 3]| triangle.map(|corner| listed.corners[corner as usize]);
         let used = || {
             listed
@@ -187,7 +187,7 @@ impl Mesh {
             Bounds(Aabb::new(bounds.min - room, bounds.max + room))
         };
         let bounds: Vec<Bounds> = listed.triangles.iter().map(grown).collect();
-        let (tree, numbers) = Tree::over(&bounds);
+        let (tree, numbers) = Tree::build(&bounds);
         drop(bounds);
         let in_order = || numbers.iter().map(|&number| number as usize);
         Mesh {
@@ -217,7 +217,7 @@ impl Mesh {
 
     /// Where a ray in the mesh's own coordinates first meets it; the part is the triangle's place in the tree's order. Of two in the same
     /// place the one listed first in the file counts.
-    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let about = Ray {
             origin: ray.origin - self.middle,
             direction: ray.direction,
@@ -236,7 +236,7 @@ impl Mesh {
             range_m < other.range_m
                 || (range_m == other.range_m && number(part) < number(other.part))
         };
-        let start = about.at(skipped).as_vec3a();
+        let start = about.point(skipped).as_vec3a();
         self.tree.follow(start, ray.direction.as_vec3a(), |places| {
             for part in places.start as u32..places.end as u32 {
                 if let Some(range_m) = self.meet_triangle(ray, part)

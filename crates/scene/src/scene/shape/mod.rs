@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Shapes that can be turned do their geometry in coordinates of their own ([`Pose`](pose::Pose)), worked out once for many rays
-//! ([`Placed`]).
+//! ([`PlacedShape`]).
 
 mod flat;
 mod kinds;
@@ -27,7 +27,7 @@ pub use kinds::Shape;
 pub use map::{DepthMap, MapFiles};
 pub(super) use meeting::Meeting;
 pub use mesh::Mesh;
-pub(super) use placed::Placed;
+pub(super) use placed::PlacedShape;
 
 #[cfg(test)]
 mod tests {
@@ -117,7 +117,7 @@ mod tests {
             let centre_m = DVec3::new(0.3, -0.2, 8.0);
             let ray = ray(x, y, 8.0);
             if let Some(range_m) = (Shape::Sphere { centre_m, radius_m }).intersect(&ray) {
-                prop_assert!(((ray.at(range_m) - centre_m).length() - radius_m).abs() < 1e-6);
+                prop_assert!(((ray.point(range_m) - centre_m).length() - radius_m).abs() < 1e-6);
             }
         }
     }

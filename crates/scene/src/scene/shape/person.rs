@@ -22,27 +22,30 @@ enum Limb {
     Capsule((DVec3, DVec3), f64),
 }
 
-const fn at(x: f64, y: f64, z: f64) -> DVec3 {
+const fn point(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
 /// Head, neck, trunk, arms and legs.
 const LIMBS: [Limb; 7] = [
-    Limb::Ball(at(0.0, -0.935, 0.0), 0.065),
-    Limb::Capsule((at(0.0, -0.88, 0.0), at(0.0, -0.81, 0.0)), 0.03),
-    Limb::Block(at(0.0, -0.665, 0.0), at(0.23, 0.31, 0.12)),
-    Limb::Capsule((at(-0.14, -0.795, 0.0), at(-0.16, -0.49, 0.08)), 0.025),
-    Limb::Capsule((at(0.14, -0.795, 0.0), at(0.16, -0.49, -0.08)), 0.025),
-    Limb::Capsule((at(-0.06, -0.51, 0.0), at(-0.06, -0.04, -0.11)), 0.04),
-    Limb::Capsule((at(0.06, -0.51, 0.0), at(0.06, -0.04, 0.11)), 0.04),
+    Limb::Ball(point(0.0, -0.935, 0.0), 0.065),
+    Limb::Capsule((point(0.0, -0.88, 0.0), point(0.0, -0.81, 0.0)), 0.03),
+    Limb::Block(point(0.0, -0.665, 0.0), point(0.23, 0.31, 0.12)),
+    Limb::Capsule(
+        (point(-0.14, -0.795, 0.0), point(-0.16, -0.49, 0.08)),
+        0.025,
+    ),
+    Limb::Capsule((point(0.14, -0.795, 0.0), point(0.16, -0.49, -0.08)), 0.025),
+    Limb::Capsule((point(-0.06, -0.51, 0.0), point(-0.06, -0.04, -0.11)), 0.04),
+    Limb::Capsule((point(0.06, -0.51, 0.0), point(0.06, -0.04, 0.11)), 0.04),
 ];
 
 /// What all limbs lie in: middle and size.
-pub(super) const AROUND: (DVec3, DVec3) = (at(0.0, -0.5, 0.0), at(0.38, 1.0, 0.32));
+pub(super) const AROUND: (DVec3, DVec3) = (point(0.0, -0.5, 0.0), point(0.38, 1.0, 0.32));
 
 /// Where a ray in the person's own place and turn meets a person of `height_m`. The part is the limb, and in steps of 8
 /// the axis of the trunk's face.
-pub(super) fn meet(ray: &Ray, height_m: f64) -> Option<Meeting> {
+pub(super) fn intersect(ray: &Ray, height_m: f64) -> Option<Meeting> {
     let ray = Ray {
         origin: ray.origin / height_m,
         direction: ray.direction,
@@ -126,29 +129,29 @@ mod tests {
         fn rays_end_where_walking_along_them_ends(
             x in -0.3f64..0.3, y in -1.1f64..0.1, turn in 0.0f64..6.3, height_m in 0.5f64..2.5,
         ) {
-            let origin = at(turn.sin(), -0.6, -turn.cos()) * 3.0 * height_m;
-            let ray = Ray::new(origin, at(0.0, y, 0.0) * height_m + at(turn.cos(), 0.0, turn.sin()) * x * height_m - origin);
+            let origin = point(turn.sin(), -0.6, -turn.cos()) * 3.0 * height_m;
+            let ray = Ray::new(origin, point(0.0, y, 0.0) * height_m + point(turn.cos(), 0.0, turn.sin()) * x * height_m - origin);
             let (mut walked, mut closest) = (Some(0.0), f64::MAX);
             while let Some(so_far) = walked {
-                let point = ray.at(so_far) / height_m;
+                let point = ray.point(so_far) / height_m;
                 let step = LIMBS.iter().map(|limb| distance(limb, point)).fold(f64::MAX, f64::min);
                 closest = closest.min(step);
                 if step < 1e-8 { break }
                 walked = (so_far < 9.0 * height_m).then_some(so_far + step * height_m);
             }
-            let met = meet(&ray, height_m);
+            let met = intersect(&ray, height_m);
             match (met, walked) {
                 (None, None) => {}
                 (Some(Meeting { range_m, part }), Some(walked_m)) => {
                     let least = |range_m: f64| {
-                        let point = ray.at(range_m) / height_m;
+                        let point = ray.point(range_m) / height_m;
                         LIMBS.iter().map(|limb| distance(limb, point)).fold(f64::MAX, f64::min)
                     };
                     prop_assert!(least(range_m).abs() < 1e-9);
                     // Unless the walk ended where the ray only grazes a limb.
                     let grazed = least(walked_m + 1e-3) > 0.0;
                     prop_assert!(grazed || (range_m - walked_m).abs() < 1e-3, "{range_m} {walked_m}");
-                    let point = ray.at(range_m) / height_m;
+                    let point = ray.point(range_m) / height_m;
                     let normal = normal_at(point, part);
                     let limb = &LIMBS[(part % 8) as usize];
                     let rise = distance(limb, point + normal * 1e-6) - distance(limb, point);

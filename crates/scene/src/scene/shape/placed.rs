@@ -13,7 +13,7 @@ use crate::scene::vector::{Ray, turned};
 
 /// A [`Shape`] where it stands.
 #[derive(Debug)]
-pub(in crate::scene) enum Placed<'a> {
+pub(in crate::scene) enum PlacedShape<'a> {
     Ground {
         depth_m: f64,
     },
@@ -52,40 +52,40 @@ impl Shape {
     /// Distance along `ray` to the first surface point in front of its origin, m.
     #[cfg(test)]
     pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
-        self.placed().meet(ray).map(|meeting| meeting.range_m)
+        self.placed().intersect(ray).map(|meeting| meeting.range_m)
     }
 
     /// The shape made ready for many rays.
-    pub(in crate::scene) fn placed(&self) -> Placed<'_> {
-        Placed::new(self)
+    pub(in crate::scene) fn placed(&self) -> PlacedShape<'_> {
+        PlacedShape::new(self)
     }
 }
 
-impl<'a> Placed<'a> {
+impl<'a> PlacedShape<'a> {
     pub(super) fn new(shape: &'a Shape) -> Self {
         match *shape {
-            Shape::Ground { depth_m } => Placed::Ground { depth_m },
+            Shape::Ground { depth_m } => PlacedShape::Ground { depth_m },
             Shape::Plane {
                 centre_m,
                 normal,
                 width_m,
                 height_m,
-            } => Placed::Plane(Flat::new(centre_m, normal, (width_m, height_m))),
+            } => PlacedShape::Plane(Flat::new(centre_m, normal, (width_m, height_m))),
             Shape::Box {
                 centre_m,
                 size_m,
                 yaw_deg,
-            } => Placed::Box {
+            } => PlacedShape::Box {
                 pose: Pose::new(centre_m, yaw_deg),
                 size_m,
             },
-            Shape::Sphere { centre_m, radius_m } => Placed::Sphere { centre_m, radius_m },
+            Shape::Sphere { centre_m, radius_m } => PlacedShape::Sphere { centre_m, radius_m },
             Shape::Cylinder {
                 centre_m,
                 axis,
                 radius_m,
                 height_m,
-            } => Placed::Cylinder {
+            } => PlacedShape::Cylinder {
                 centre_m,
                 axis: axis.normalize(),
                 radius_m,
@@ -95,7 +95,7 @@ impl<'a> Placed<'a> {
                 foot_m,
                 height_m,
                 yaw_deg,
-            } => Placed::Person {
+            } => PlacedShape::Person {
                 pose: Pose::new(foot_m, yaw_deg),
                 height_m,
             },
@@ -104,7 +104,7 @@ impl<'a> Placed<'a> {
                 scale_m,
                 yaw_deg,
                 ref mesh,
-            } => Placed::Mesh {
+            } => PlacedShape::Mesh {
                 pose: Pose::new(centre_m, yaw_deg),
                 scale_m,
                 mesh,
@@ -113,7 +113,7 @@ impl<'a> Placed<'a> {
                 centre_m,
                 yaw_deg,
                 ref map,
-            } => Placed::Map {
+            } => PlacedShape::Map {
                 pose: Pose::new(centre_m, yaw_deg),
                 map,
             },
@@ -121,20 +121,24 @@ impl<'a> Placed<'a> {
     }
 
     /// Where a ray first meets the surface.
-    pub(in crate::scene) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+    pub(in crate::scene) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         match *self {
-            Placed::Ground { depth_m } => flat::meet_ground(ray, depth_m),
-            Placed::Plane(ref flat) => flat.meet(ray),
-            Placed::Box { pose, size_m } => solid::meet_box(&pose.inwards(ray), size_m),
-            Placed::Sphere { centre_m, radius_m } => round::meet_sphere(ray, centre_m, radius_m),
-            Placed::Cylinder {
+            PlacedShape::Ground { depth_m } => flat::meet_ground(ray, depth_m),
+            PlacedShape::Plane(ref flat) => flat.intersect(ray),
+            PlacedShape::Box { pose, size_m } => solid::meet_box(&pose.inwards(ray), size_m),
+            PlacedShape::Sphere { centre_m, radius_m } => {
+                round::meet_sphere(ray, centre_m, radius_m)
+            }
+            PlacedShape::Cylinder {
                 centre_m,
                 axis,
                 radius_m,
                 height_m,
             } => round::meet_cylinder(ray, centre_m, axis, (radius_m, height_m)),
-            Placed::Person { pose, height_m } => person::meet(&pose.inwards(ray), height_m),
-            Placed::Mesh {
+            PlacedShape::Person { pose, height_m } => {
+                person::intersect(&pose.inwards(ray), height_m)
+            }
+            PlacedShape::Mesh {
                 pose,
                 scale_m,
                 mesh,
@@ -144,29 +148,29 @@ impl<'a> Placed<'a> {
                     origin: inside.origin / scale_m,
                     direction: inside.direction,
                 };
-                let meeting = mesh.meet(&scaled)?;
+                let meeting = mesh.intersect(&scaled)?;
                 let range_m = in_front(meeting.range_m * scale_m)?;
                 Some(Meeting { range_m, ..meeting })
             }
-            Placed::Map { pose, map } => map.meet(&pose.inwards(ray)),
+            PlacedShape::Map { pose, map } => map.intersect(&pose.inwards(ray)),
         }
     }
 
     /// A unit vector at right angles to `part` of the surface at `point`, which lies on it; of the two it is any.
     pub(in crate::scene) fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
         match *self {
-            Placed::Ground { .. } => DVec3::NEG_Y,
-            Placed::Plane(ref flat) => flat.normal,
-            Placed::Box { pose, .. } => pose.outwards(solid::face_normal(part)),
-            Placed::Sphere { centre_m, .. } => (point - centre_m).normalize(),
-            Placed::Cylinder { centre_m, axis, .. } => {
+            PlacedShape::Ground { .. } => DVec3::NEG_Y,
+            PlacedShape::Plane(ref flat) => flat.normal,
+            PlacedShape::Box { pose, .. } => pose.outwards(solid::face_normal(part)),
+            PlacedShape::Sphere { centre_m, .. } => (point - centre_m).normalize(),
+            PlacedShape::Cylinder { centre_m, axis, .. } => {
                 round::cylinder_normal(point - centre_m, axis, part)
             }
-            Placed::Person { pose, height_m } => {
+            PlacedShape::Person { pose, height_m } => {
                 pose.outwards(person::normal_at(pose.inside(point) / height_m, part))
             }
-            Placed::Mesh { pose, mesh, .. } => pose.outwards(mesh.normal(part)),
-            Placed::Map { pose, map } => pose.outwards(map.normal_at(pose.inside(point))),
+            PlacedShape::Mesh { pose, mesh, .. } => pose.outwards(mesh.normal(part)),
+            PlacedShape::Map { pose, map } => pose.outwards(map.normal_at(pose.inside(point))),
         }
     }
 
@@ -174,8 +178,8 @@ impl<'a> Placed<'a> {
     /// made of flats.
     pub(in crate::scene) fn bend(&self, part: u32, step_m: DVec3) -> DVec3 {
         match *self {
-            Placed::Sphere { radius_m, .. } => step_m / radius_m,
-            Placed::Cylinder { axis, radius_m, .. } => {
+            PlacedShape::Sphere { radius_m, .. } => step_m / radius_m,
+            PlacedShape::Cylinder { axis, radius_m, .. } => {
                 round::cylinder_bend(step_m, axis, radius_m, part)
             }
             _ => DVec3::ZERO,
@@ -195,13 +199,13 @@ impl<'a> Placed<'a> {
             turned(vector, (cosine, sine))
         };
         match *self {
-            Placed::Ground { .. } => (point.x, -point.z),
-            Placed::Plane(ref flat) => flat.on_surface(point),
-            Placed::Box { pose, .. } => solid::on_face(pose.inside(point), part),
-            Placed::Sphere { centre_m, radius_m } => {
+            PlacedShape::Ground { .. } => (point.x, -point.z),
+            PlacedShape::Plane(ref flat) => flat.on_surface(point),
+            PlacedShape::Box { pose, .. } => solid::on_face(pose.inside(point), part),
+            PlacedShape::Sphere { centre_m, radius_m } => {
                 round::on_sphere(turned_back(point - centre_m), radius_m)
             }
-            Placed::Cylinder {
+            PlacedShape::Cylinder {
                 centre_m,
                 axis,
                 radius_m,
@@ -210,12 +214,12 @@ impl<'a> Placed<'a> {
                 let (offset, axis) = (turned_back(point - centre_m), turned_back(axis));
                 round::on_cylinder(offset, axis, radius_m, part)
             }
-            Placed::Person { pose, .. } => {
+            PlacedShape::Person { pose, .. } => {
                 // Front and back carry what hangs straight down them; no two limbs carry the same.
                 let inside = pose.inside(point);
                 (inside.x + 0.7 * inside.z, inside.y)
             }
-            Placed::Mesh {
+            PlacedShape::Mesh {
                 pose,
                 scale_m,
                 mesh,
@@ -223,7 +227,7 @@ impl<'a> Placed<'a> {
                 let (u, v) = mesh.on_surface(pose.inside(point) / scale_m, part);
                 (u * scale_m, v * scale_m)
             }
-            Placed::Map { pose, .. } => {
+            PlacedShape::Map { pose, .. } => {
                 let inside = pose.inside(point);
                 (inside.x, inside.y)
             }
@@ -233,7 +237,7 @@ impl<'a> Placed<'a> {
     /// Reflectivity for the laser and for the cameras, where the shape itself knows them.
     pub(in crate::scene) fn own_material(&self, point: DVec3) -> (Option<f64>, Option<f64>) {
         match self {
-            Placed::Map { pose, map } => map.material_at(pose.inside(point)),
+            PlacedShape::Map { pose, map } => map.material_at(pose.inside(point)),
             _ => (None, None),
         }
     }

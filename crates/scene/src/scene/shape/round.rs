@@ -119,7 +119,7 @@ pub(super) fn meet_capsule(
     let axis = (to_m - from_m) / length_m;
     let on_side = pierced(ray, from_m, axis, radius_m).and_then(|(enter, leave)| {
         let meets = |range_m: f64| {
-            let height_m = (ray.at(range_m) - from_m).dot(axis);
+            let height_m = (ray.point(range_m) - from_m).dot(axis);
             in_front(range_m).filter(|_| (0.0..=length_m).contains(&height_m))
         };
         meets(enter).or_else(|| meets(leave))

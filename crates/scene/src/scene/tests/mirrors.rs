@@ -229,7 +229,7 @@ fn fog_before_a_mirror_or_pane_is_there_once() {
 }
 
 /// Something at the image that the lidar sees, and then what there is.
-fn thing(place: DVec3, normal: DVec3, is_ball: bool) -> Object {
+fn object_at(place: DVec3, normal: DVec3, is_ball: bool) -> Object {
     let shape = if is_ball {
         Shape::Sphere {
             centre_m: place,
@@ -278,12 +278,12 @@ proptest! {
         prop_assume!(distance_m(place, ways[0]) > 1.0 && distance_m(place, ways[1]) > 1.0);
         prop_assume!(distance_m(two.0, ways[0]) > 1.0 && distance_m(one.0, ways[2]) > 1.0);
         let mut scene = lidar();
-        scene.objects = vec![thing(seen, facing, is_ball)];
+        scene.objects = vec![object_at(seen, facing, is_ball)];
         let straight = light(&scene);
         scene.objects = vec![
             mirror(sheet(one.0, one.1, 1.0), 0.9),
             mirror(sheet(two.0, two.1, 1.0), 0.8),
-            thing(place, turned, is_ball),
+            object_at(place, turned, is_ball),
         ];
         are_alike(&light(&scene), &straight, (0.9f64 * 0.8).powi(2))?;
     }
@@ -304,17 +304,17 @@ proptest! {
         let mut scene = lidar();
         scene.objects = vec![mirror(shape, 1.0)];
         let look = Ray::new(DVec3::ZERO, DVec3::new(aim.0 * radius_m / 3.0, aim.1 * radius_m / 3.0, 1.0));
-        let stage = Stage::of(&scene);
+        let stage = Stage::new(&scene);
         let meeting_m = stage.range_to_hit(&look).unwrap();
         let thrown = |ray: &Ray| {
             let hit = stage.hit(ray).unwrap();
-            Ray::new(ray.at(hit.range_m), image(ray.direction, (DVec3::ZERO, hit.normal)))
+            Ray::new(ray.point(hit.range_m), image(ray.direction, (DVec3::ZERO, hit.normal)))
         };
         let onwards = thrown(&look);
         // A wall beside the lidar, tilted as it likes.
-        let place = onwards.at(6.0);
+        let place = onwards.point(6.0);
         let normal = tilted(-onwards.direction, lean);
-        let ends_at = |ray: Ray| ray.at((place - ray.origin).dot(normal) / ray.direction.dot(normal));
+        let ends_at = |ray: Ray| ray.point((place - ray.origin).dot(normal) / ray.direction.dot(normal));
         let length_m = |look: &Ray| {
             let onwards = thrown(look);
             look.origin.distance(onwards.origin) + onwards.origin.distance(ends_at(onwards))
@@ -336,7 +336,7 @@ proptest! {
         };
         let there_m2 = area_m2(&look, &|ray| ends_at(thrown(ray))).dot(onwards.direction).abs();
         let back_look = Ray::new(place, -onwards.direction);
-        let to_lens = |ray: &Ray| { let r = thrown(ray); r.at(-r.origin.dot(look.direction) / r.direction.dot(look.direction)) };
+        let to_lens = |ray: &Ray| { let r = thrown(ray); r.point(-r.origin.dot(look.direction) / r.direction.dot(look.direction)) };
         let back_m2 = area_m2(&back_look, &to_lens).dot(look.direction).abs();
         prop_assert!((there_m2 / back_m2 - 1.0).abs() < 1e-4, "{there_m2} {back_m2}");
         let kept = back.hit.range_m.powi(2) / there_m2;

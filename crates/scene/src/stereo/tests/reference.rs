@@ -2,11 +2,11 @@
 //! numbers without limits.
 
 use super::settings::Matcher;
-use super::winner::between;
+use super::winner::subpixel_offset;
 use super::{DisparityMap, GreyImage};
 
 fn census(image: &GreyImage, matcher: &Matcher, x: i64, y: i64) -> Vec<bool> {
-    let at = |x: i64, y: i64| {
+    let grey = |x: i64, y: i64| {
         let x = x.clamp(0, image.width() as i64 - 1) as usize;
         image.row(y.clamp(0, image.height() as i64 - 1) as usize)[x]
     };
@@ -16,7 +16,7 @@ fn census(image: &GreyImage, matcher: &Matcher, x: i64, y: i64) -> Vec<bool> {
     );
     (-rows..=rows)
         .flat_map(|dy| (-cols..=cols).map(move |dx| (dx, dy)))
-        .map(|(dx, dy)| at(x + dx, y + dy) < at(x, y))
+        .map(|(dx, dy)| grey(x + dx, y + dy) < grey(x, y))
         .collect()
 }
 
@@ -86,12 +86,13 @@ pub(super) fn match_pair(matcher: &Matcher, left: &GreyImage, right: &GreyImage)
                 let least = before.iter().flatten().min().copied();
                 l[index(x, y)] = (0..disparities)
                     .map(|d| {
-                        let at = |d: i64| before.get(usize::try_from(d).ok()?).copied().flatten();
+                        let cost_before =
+                            |d: i64| before.get(usize::try_from(d).ok()?).copied().flatten();
                         let p1 = i64::from(matcher.p1);
                         let ways = [
-                            at(d),
-                            at(d - 1).map(|l| l + p1),
-                            at(d + 1).map(|l| l + p1),
+                            cost_before(d),
+                            cost_before(d - 1).map(|l| l + p1),
+                            cost_before(d + 1).map(|l| l + p1),
                             least.map(|l| l + p2),
                         ];
                         // Nothing on a path is dearer than 255, which is also what is not there.
@@ -147,7 +148,7 @@ pub(super) fn match_pair(matcher: &Matcher, left: &GreyImage, right: &GreyImage)
                 continue;
             }
             let beyond = match (sum(x, best - 1), sum(x, best + 1)) {
-                (Some(less), Some(more)) => between(less as u16, least as u16, more as u16),
+                (Some(less), Some(more)) => subpixel_offset(less as u16, least as u16, more as u16),
                 _ => 0.0,
             };
             px[index(x, y)] = (min + best) as f32 + beyond;

@@ -23,7 +23,7 @@
 //!                  LOCAL_STOP ─► metdc_counter ─SELECTED─┘
 //! ```
 //!
-//! [`Model`] is those with CLK in plain Rust, stepped edge by edge through its blocks' models; only
+//! [`MacropixelModel`] is those with CLK in plain Rust, stepped edge by edge through its blocks' models; only
 //! the arrival of the strobe, of the reset and of the SPAD pulses is timed ([`ChipTiming`]).
 
 use std::collections::VecDeque;
@@ -144,21 +144,21 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
 
 /// Reference model of a macropixel during one exposure.
 #[derive(Debug, Clone)]
-pub struct Model<'a> {
+pub struct MacropixelModel<'a> {
     config: &'a SensorConfig,
     exposure: &'a Exposure,
     timing: ChipTiming,
     local_stop: &'a LocalStopDelays,
 }
 
-impl<'a> Model<'a> {
+impl<'a> MacropixelModel<'a> {
     /// A macropixel of this sensor, with these delays, and of LOCAL_STOP those of each start value, in this exposure.
     pub fn new(
         config: &'a SensorConfig,
         (timing, local_stop): (ChipTiming, &'a LocalStopDelays),
         exposure: &'a Exposure,
     ) -> Self {
-        Model {
+        MacropixelModel {
             config,
             exposure,
             timing,
@@ -210,8 +210,8 @@ impl<'a> Model<'a> {
                 .copied()
         };
         let mut pulses = pulses.into_iter().peekable();
-        let mut front_end = front_end::Model::new(config, timing);
-        let mut metdc = metdc_counter::Model::new(config.bins);
+        let mut front_end = front_end::FrontEndModel::new(config, timing);
+        let mut metdc = metdc_counter::MetdcCounterModel::new(config.bins);
         for edge in 0..=cycles * i64::from(exposure.stop_periods) + 1 {
             let rise = exposure.rising(edge);
             if let Some(bin) = metdc.selected() {
@@ -241,9 +241,9 @@ impl<'a> Model<'a> {
         let guided = config.mode == Mode::Guided;
         let has_memory = config.p_counter.row().has_memory;
         let mut pulses = pulses.into_iter().peekable();
-        let mut counter = p_counter::Model::new(config, start);
-        let mut front_end = front_end::Model::new(config, timing);
-        let mut metdc = metdc::Model::new(config.bins as u32);
+        let mut counter = p_counter::PCounterModel::new(config, start);
+        let mut front_end = front_end::FrontEndModel::new(config, timing);
+        let mut metdc = metdc::MetdcModel::new(config.bins as u32);
         let mut hit = Hit::new(self);
         let mut pending: VecDeque<Strobe> = VecDeque::new();
         let by_local_stop = |local_stop, deadline| Strobe {
@@ -341,14 +341,14 @@ struct Strobe {
 
 /// The HIT flip-flops, which a laser cycle's first strobe finds at zero and a second one does not.
 struct Hit<'m> {
-    model: &'m Model<'m>,
+    model: &'m MacropixelModel<'m>,
     held: u64,
     /// STOP edge whose reset of HIT comes next.
     next_stop: i64,
 }
 
 impl<'m> Hit<'m> {
-    fn new(model: &'m Model<'m>) -> Self {
+    fn new(model: &'m MacropixelModel<'m>) -> Self {
         Hit {
             model,
             held: 0,
@@ -358,7 +358,7 @@ impl<'m> Hit<'m> {
 
     /// Latches `hits`, unless HIT is in reset, and tells `strobe` which bits rise.
     fn latch(&mut self, s: Strobe, hits: u64, strobe: &mut impl FnMut(Time, u64)) {
-        let Model {
+        let MacropixelModel {
             config,
             exposure,
             timing,

@@ -35,7 +35,7 @@ pub fn circuit(bins: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("metdc");
     let clk = m.input("CLK");
     let event = m.input("SPAD_EVENT");
-    let strobe_inputs = StrobeInputs::of(&mut m);
+    let strobe_inputs = StrobeInputs::declare(&mut m);
     let clear = m.input("PIXEL_CLEAR");
     let hit = m.output_bus("HIT", bins);
     let shift = m.wire_bus("SHIFT", bins);
@@ -73,7 +73,7 @@ pub(super) struct StrobeInputs {
 
 impl StrobeInputs {
     /// The ports LOCAL_STOP, STOP, STOP_D, COUNTER_RESET and CONVENTIONAL.
-    pub(super) fn of(m: &mut ModuleBuilder) -> Self {
+    pub(super) fn declare(m: &mut ModuleBuilder) -> Self {
         StrobeInputs {
             local_stop: m.input("LOCAL_STOP"),
             stop: m.input("STOP"),
@@ -98,16 +98,16 @@ impl StrobeInputs {
 
 /// Reference model: the shift register as bits of a word, the newest event in bit 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Model {
+pub struct MetdcModel {
     shift: u64,
     bins: u32,
 }
 
-impl Model {
+impl MetdcModel {
     /// An empty METDC with up to 64 stages.
     pub fn new(bins: u32) -> Self {
         debug_assert!((1..=64).contains(&bins));
-        Model { shift: 0, bins }
+        MetdcModel { shift: 0, bins }
     }
 
     /// A rising edge of CLK with this SPAD_EVENT.
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn bin_zero_is_the_earliest_period() {
-        let mut model = Model::new(16);
+        let mut model = MetdcModel::new(16);
         model.clock(true);
         for _ in 0..15 {
             model.clock(false);

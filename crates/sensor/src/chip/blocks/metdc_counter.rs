@@ -49,7 +49,7 @@ const fn code_bits(bins: usize) -> usize {
 pub fn circuit(bins: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("metdc");
     let clk = m.input("CLK");
-    let strobe_inputs = metdc::StrobeInputs::of(&mut m);
+    let strobe_inputs = metdc::StrobeInputs::declare(&mut m);
     let clear = m.input("PIXEL_CLEAR");
     let select = m.output_bus("SELECTED", bins);
     let strobe = m.wire("STROBE");
@@ -114,16 +114,16 @@ pub fn adder(lines: usize) -> Arc<Module> {
 
 /// Reference model: what CLK edges make of START.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Model {
+pub struct MetdcCounterModel {
     counting: bool,
     code: usize,
     bins: usize,
 }
 
-impl Model {
+impl MetdcCounterModel {
     /// A METDC of `bins` bins after PIXEL_CLEAR.
     pub fn new(bins: usize) -> Self {
-        Model {
+        MetdcCounterModel {
             counting: false,
             code: 0,
             bins,
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn start_selects_every_bin_once_and_low_start_makes_ready_for_the_next_window() {
-        let mut model = Model::new(3);
+        let mut model = MetdcCounterModel::new(3);
         let mut clocked = |start| {
             model.clock(start);
             model.selected()

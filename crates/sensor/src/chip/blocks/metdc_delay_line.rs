@@ -62,7 +62,7 @@ pub const LINES: [&str; 2] = ["EVEN", "ODD"];
 pub fn circuit(bins: usize, elements: &Elements) -> Arc<Module> {
     let mut m = ModuleBuilder::new("metdc");
     let photons = m.input("PHOTONS");
-    let strobe_inputs = metdc::StrobeInputs::of(&mut m);
+    let strobe_inputs = metdc::StrobeInputs::declare(&mut m);
     let clear = m.input("PIXEL_CLEAR");
     let init = m.input("COUNTER_INIT");
     let load = m.input("MEMORY_LOAD");

@@ -81,7 +81,7 @@ pub fn circuit(after_borrow: AfterBorrow, stages: usize) -> Arc<Module> {
 
 /// Reference model: the block's inputs, and what it makes of them when everything has settled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Model {
+pub struct PCounterTimingModel {
     /// Whether LOCAL_STOP blocks COUNTER_CLK.
     pub after_borrow: AfterBorrow,
     /// CLK.
@@ -94,7 +94,7 @@ pub struct Model {
     pub local_stop: bool,
 }
 
-impl Model {
+impl PCounterTimingModel {
     /// COUNTER_CLK: NOT CLK, while enabled and, if the counter is to hold, before LOCAL_STOP.
     pub fn counter_clk(&self) -> bool {
         let is_held = self.local_stop && self.after_borrow == AfterBorrow::Hold;
@@ -123,23 +123,23 @@ mod tests {
 
     #[test]
     fn local_stop_and_enable_block_the_clock_and_only_enable_resets() {
-        let running = Model {
+        let running = PCounterTimingModel {
             resetb: true,
             enable: true,
-            ..Model::default()
+            ..PCounterTimingModel::default()
         };
         assert!(running.counter_clk() && !running.counter_reset());
-        let stopped = Model {
+        let stopped = PCounterTimingModel {
             local_stop: true,
             ..running
         };
         assert!(!stopped.counter_clk() && !stopped.counter_reset());
-        let wrapping = Model {
+        let wrapping = PCounterTimingModel {
             after_borrow: AfterBorrow::Wrap,
             ..stopped
         };
         assert!(wrapping.counter_clk());
-        let disabled = Model {
+        let disabled = PCounterTimingModel {
             enable: false,
             ..running
         };

@@ -73,16 +73,16 @@ pub(crate) fn stage(toggle_to_photons: Time, spads: usize) -> Time {
 /// gives the time and the SPAD of a pulse; pulses are sorted by both. An edge comes all stages later than its pulse.
 pub fn model<P: Copy>(
     pulses: &mut Vec<P>,
-    of: impl Fn(&P) -> (Time, u8),
+    time_and_spad: impl Fn(&P) -> (Time, u8),
     spads: usize,
     stage: Time,
 ) {
     let mut left = 0;
     let mut first = 0;
     while let Some(pulse) = pulses.get(first) {
-        let mut last_time = of(pulse).0;
+        let mut last_time = time_and_spad(pulse).0;
         let near = pulses[first + 1..].iter().take_while(|pulse| {
-            let time = of(pulse).0;
+            let time = time_and_spad(pulse).0;
             let is_near = time < last_time + stage;
             last_time = time;
             is_near
@@ -94,7 +94,7 @@ pub fn model<P: Copy>(
             left += 1;
         } else if end - first > 2 || spads == 1 {
             let together = (first..end).map(|at| {
-                let (time, spad) = of(&pulses[at]);
+                let (time, spad) = time_and_spad(&pulses[at]);
                 (time, spad, at)
             });
             for (_, _, at) in edges(&together.collect::<Together>(), 0..spads as u8, stage) {

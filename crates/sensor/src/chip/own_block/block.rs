@@ -63,7 +63,7 @@ impl Setting for OwnBlock {
 
 impl OwnBlock {
     /// A block that is read already.
-    pub fn of(file: impl Into<PathBuf>, module: Arc<Module>, text: &str) -> Self {
+    pub fn from_module(file: impl Into<PathBuf>, module: Arc<Module>, text: &str) -> Self {
         let mut hasher = DefaultHasher::new();
         (text, module.name()).hash(&mut hasher);
         let read = Read {
@@ -91,8 +91,8 @@ impl OwnBlock {
         let module = Module::from_yosys_of(&text, top, library);
         let module = module.map_err(|e| format!("{}: {e}", file.display()))?;
         // What cells of a library do, the library says.
-        let of = library.map_or(String::new(), |library| library.name.clone());
-        *self = OwnBlock::of(asked, module, &(text + &of));
+        let library_name = library.map_or(String::new(), |library| library.name.clone());
+        *self = OwnBlock::from_module(asked, module, &(text + &library_name));
         Ok(())
     }
 

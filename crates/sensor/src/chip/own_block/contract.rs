@@ -29,7 +29,7 @@ pub(crate) struct Contract {
     /// What a sensor has instead where delay lines time photons, if that leaves no place for it.
     delay_lines: Option<&'static str>,
     /// What it does not do.
-    flaw: fn(&Found<'_>) -> Option<String>,
+    flaw: fn(&CheckedBlock<'_>) -> Option<String>,
     /// Whether a window law says what it counts.
     has_law: bool,
     /// Whether loops may lead through flip-flops.
@@ -108,14 +108,14 @@ pub fn replaceable() -> impl Iterator<Item = &'static str> {
 }
 
 /// A netlist in question.
-struct Found<'n> {
+struct CheckedBlock<'n> {
     netlist: &'n Netlist,
     probes: Probes,
     paths: &'n StaticTiming<'n>,
 }
 
-impl<'n> Found<'n> {
-    fn after(&self, from: &[NetId], edges: &[Edge]) -> Arrivals<'n> {
+impl<'n> CheckedBlock<'n> {
+    fn arrivals_after(&self, from: &[NetId], edges: &[Edge]) -> Arrivals<'n> {
         let starts = from
             .iter()
             .flat_map(|&net| edges.iter().map(move |&edge| (net, edge)));
@@ -198,7 +198,7 @@ impl Contract {
             ));
         }
         let (netlist, probes) = (&netlist, Probes::of_block(&netlist));
-        match (self.flaw)(&Found {
+        match (self.flaw)(&CheckedBlock {
             netlist,
             probes,
             paths,
@@ -209,9 +209,9 @@ impl Contract {
     }
 }
 
-fn p_counter(found: &Found<'_>) -> Option<String> {
+fn p_counter(found: &CheckedBlock<'_>) -> Option<String> {
     let clk = found.probes.net(Probe::CounterClk);
-    let after = found.after(&[clk], &[Edge::Rise]);
+    let after = found.arrivals_after(&[clk], &[Edge::Rise]);
     let mut cells = found.netlist.cells().iter();
     let counts = cells.any(|cell| {
         let is_clocked = cell.kind.is_flip_flop() && cell.input(1) == clk;
@@ -232,15 +232,15 @@ fn p_counter(found: &Found<'_>) -> Option<String> {
     None
 }
 
-fn correlation(found: &Found<'_>) -> Option<String> {
-    let after = found.after(found.probes.bus(Probe::SpadTimed), &Edge::BOTH);
+fn correlation(found: &CheckedBlock<'_>) -> Option<String> {
+    let after = found.arrivals_after(found.probes.bus(Probe::SpadTimed), &Edge::BOTH);
     let changes = after.window(found.probes.net(Probe::SpadEvent)).is_some();
     let flaw = "has a SPAD_EVENT that no SPAD_TIMED changes; make it of gates behind them";
     (!changes).then(|| flaw.to_owned())
 }
 
-fn front_end(found: &Found<'_>) -> Option<String> {
-    let Found {
+fn front_end(found: &CheckedBlock<'_>) -> Option<String> {
+    let CheckedBlock {
         netlist, probes, ..
     } = found;
     let samplers: Vec<usize> = probes.samplers(netlist).collect();
@@ -258,7 +258,7 @@ fn front_end(found: &Found<'_>) -> Option<String> {
             "has a SPAD_RAW[{spad}] that no flip-flop samples; take it, or what it toggles, with posedge CLK"
         ));
     }
-    let after = found.after(&[probes.net(Probe::Clk)], &[Edge::Rise]);
+    let after = found.arrivals_after(&[probes.net(Probe::Clk)], &[Edge::Rise]);
     let mut lines = probes.bus(Probe::SpadTimed).iter();
     let line = lines.position(|&line| after.window(line).is_none())?;
     Some(format!(
@@ -276,8 +276,8 @@ const TO_HIT: [(Probe, Edge, usize, Option<Edge>); 6] = [
     (Probe::Clk, Edge::Rise, 0, None),
 ];
 
-fn metdc(found: &Found<'_>) -> Option<String> {
-    let Found {
+fn metdc(found: &CheckedBlock<'_>) -> Option<String> {
+    let CheckedBlock {
         netlist, probes, ..
     } = found;
     let cells = probes.find_hit_cells(netlist).unwrap_or_default();
@@ -295,7 +295,7 @@ fn metdc(found: &Found<'_>) -> Option<String> {
         );
     }
     TO_HIT.into_iter().find_map(|(from, edge, pin, to)| {
-        let after = found.after(&[probes.net(from)], &[edge]);
+        let after = found.arrivals_after(&[probes.net(from)], &[edge]);
         let leads = |cell: &&FlatCell| match to {
             Some(to) => after.edge_window(cell.input(pin), to).is_some(),
             None => after.window(cell.input(pin)).is_some(),
@@ -311,7 +311,7 @@ fn metdc(found: &Found<'_>) -> Option<String> {
     })
 }
 
-fn histogram(found: &Found<'_>) -> Option<String> {
+fn histogram(found: &CheckedBlock<'_>) -> Option<String> {
     let netlist = found.netlist;
     let reached = reached(
         netlist,

@@ -27,7 +27,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::chip::config::AfterBorrow;
-use crate::chip::p_counter::count_down::{Expected, SHORTEST_PAUSE};
+use crate::chip::p_counter::count_down::{CountDownSetup, SHORTEST_PAUSE};
 use crate::chip::timing::silicon::Silicon;
 use crate::chip::{Probe, Probes};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
@@ -42,7 +42,7 @@ const R: usize = 2;
 const S: usize = 3;
 
 /// The cell by which a P-counter remembers more than it may, in the words of its user; `None` where there is none.
-pub(super) fn hidden_state(module: &Arc<Module>, expected: Expected) -> Option<String> {
+pub(super) fn hidden_state(module: &Arc<Module>, expected: CountDownSetup) -> Option<String> {
     let netlist = &Netlist::elaborate(module);
     let counter = &Counter::new(netlist);
     let idle = counter.values(&[(Probe::MemoryLoad, false)], &[]);
@@ -484,7 +484,7 @@ impl<'c> Load<'c> {
             time,
             net,
             mask: u64::MAX,
-            values: Lanes::known(word),
+            values: Lanes::from_bits(word),
         });
         self.now += SHORTEST_PAUSE;
         self.kernel
@@ -520,7 +520,7 @@ impl<'c> Load<'c> {
     }
 
     /// A flip-flop that is not the same when LOCAL_STOP rises for the second time as when it rose first.
-    fn changed_by_a_round(mut self, counting: &[usize], expected: Expected) -> Option<usize> {
+    fn changed_by_a_round(mut self, counting: &[usize], expected: CountDownSetup) -> Option<usize> {
         self.set(Probe::CounterReset, false);
         let local_stop = self.counter.local_stop();
         let bits = self.counter.init().len();

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use crate::chip::config::AfterBorrow;
 use crate::chip::p_counter::Rises;
-use crate::chip::p_counter::count_down::{CountDown, Counted, Expected};
+use crate::chip::p_counter::count_down::{CountDown, CountDownResult, CountDownSetup};
 use crate::chip::timing::silicon::Silicon;
 use crate::chip::{Probe, Probes};
 use crate::kernel::LANES;
@@ -64,7 +64,7 @@ pub struct CounterLaw {
     /// By start value.
     codes: Vec<u16>,
     /// By start value.
-    counted: Vec<Counted>,
+    counted: Vec<CountDownResult>,
     offset: u32,
     uneven: Option<Uneven>,
 }
@@ -110,7 +110,7 @@ impl CounterLaw {
     }
 
     /// Measures it on the gates.
-    pub(super) fn measure(module: &Arc<Module>, expected: Expected) -> Self {
+    pub(super) fn measure(module: &Arc<Module>, expected: CountDownSetup) -> Self {
         let netlist = Netlist::elaborate(module);
         let probes = &Probes::of_block(&netlist);
         let bits = probes.bus(Probe::CounterInit).len();
@@ -123,16 +123,16 @@ impl CounterLaw {
             let counter = CountDown::new((&netlist, probes), &timing, codes, expected);
             counter.measure(times)
         });
-        let parts: Result<Vec<Vec<Counted>>, Uneven> = parts.collect();
+        let parts: Result<Vec<Vec<CountDownResult>>, Uneven> = parts.collect();
         let straight = parts.map(|parts| parts.concat());
-        let plain = |counted: Vec<Counted>, uneven| CounterLaw {
+        let plain = |counted: Vec<CountDownResult>, uneven| CounterLaw {
             codes: codes.clone(),
             counted,
             offset: 0,
             uneven: Some(uneven),
         };
         match straight {
-            Err(why) => plain(vec![Counted::NEVER; codes.len()], why),
+            Err(why) => plain(vec![CountDownResult::NEVER; codes.len()], why),
             Ok(counted) => match line(&counted, expected) {
                 Err(why) => plain(counted, why),
                 Ok((codes, offset)) => CounterLaw {
@@ -150,7 +150,7 @@ impl CounterLaw {
 }
 
 /// The codes by start value, and the offset, of a line through the edges of all codes that raise LOCAL_STOP.
-fn line(counted: &[Counted], expected: Expected) -> Result<(Vec<u16>, u32), Uneven> {
+fn line(counted: &[CountDownResult], expected: CountDownSetup) -> Result<(Vec<u16>, u32), Uneven> {
     let step = expected.step_periods;
     let rising = (0u16..).zip(counted);
     let rising = rising.filter_map(|(code, of)| Some((of.rises[0]?, code)));
@@ -213,7 +213,7 @@ mod tests {
                     if config.check().is_err() {
                         continue;
                     }
-                    let expected = Expected::of_sensor(&config);
+                    let expected = CountDownSetup::of_sensor(&config);
                     let law = CounterLaw::measure(&p_counter::circuit(&config), expected);
                     assert_eq!((law.uneven(), law.offset()), (None, 0), "{config:?}");
                     assert!(law.is_plain(), "{config:?}");
@@ -225,7 +225,7 @@ mod tests {
                         );
                         assert_eq!(
                             law.rises(start),
-                            Rises::of(&config, start),
+                            Rises::from_start_value(&config, start),
                             "{config:?} {start}"
                         );
                     }

@@ -25,13 +25,13 @@ pub use contract::replaceable;
 pub use law::{CounterLaw, Uneven};
 
 use super::config::SensorConfig;
-use super::p_counter::count_down::Expected;
+use super::p_counter::count_down::CountDownSetup;
 
 /// Laws that have been measured, by netlist and what is expected of it.
-type Laws = HashMap<(u64, Expected), Arc<CounterLaw>>;
+type Laws = HashMap<(u64, CountDownSetup), Arc<CounterLaw>>;
 
 /// What is known of the state of netlists, likewise.
-type HiddenStates = HashMap<(u64, Expected), Option<String>>;
+type HiddenStates = HashMap<(u64, CountDownSetup), Option<String>>;
 
 impl OwnBlock {
     /// The state that it must not have as the P-counter of this sensor, and the cell that holds it; looked for once a process. It must
@@ -39,7 +39,7 @@ impl OwnBlock {
     fn hidden_state(&self, config: &SensorConfig) -> Option<String> {
         static KNOWN: LazyLock<Mutex<HiddenStates>> = LazyLock::new(Mutex::default);
         let (module, hash) = (self.module()?, self.hash()?);
-        let expected = Expected::of_sensor(config);
+        let expected = CountDownSetup::of_sensor(config);
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         let state = known.entry((hash, expected));
         state
@@ -52,7 +52,7 @@ impl OwnBlock {
         static LAWS: LazyLock<Mutex<Laws>> = LazyLock::new(Mutex::default);
         let module = self.module().expect("it has been checked");
         let hash = self.hash().expect("it has been checked");
-        let expected = Expected::of_sensor(config);
+        let expected = CountDownSetup::of_sensor(config);
         let mut laws = LAWS.lock().unwrap_or_else(PoisonError::into_inner);
         let law = laws.entry((hash, expected));
         Arc::clone(law.or_insert_with(|| Arc::new(CounterLaw::measure(module, expected))))
@@ -96,7 +96,7 @@ mod tests {
         m.input("LOCAL_STOP");
         let more = m.output("MORE");
         m.gate_into(CellKind::Inv, &init[..1], more);
-        let block = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+        let block = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
         assert_eq!(
             CONTRACTS[0].holds(&block, &built_in).unwrap_err(),
             "mine.json: module mine has other ports than p_counter: COUNTER_INIT has 8 bits instead of 9, \
@@ -122,7 +122,7 @@ mod tests {
             m.gate_into(CellKind::Nand2, &[clk, b], a);
             m.gate_into(CellKind::Buf, &[a], b);
         }
-        let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+        let own = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
         CONTRACTS[0].holds(&own, &built_in)
     }
 
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn blocks_are_told_apart_by_their_file_and_text() {
         let built_in = front_end::circuit(&SensorConfig::default());
-        let block = |file: &str, text: &str| OwnBlock::of(file, built_in.clone(), text);
+        let block = |file: &str, text: &str| OwnBlock::from_module(file, built_in.clone(), text);
         let same = block("mine.json", "a");
         assert_eq!(same, block("mine.json", "a"));
         assert_ne!(same, block("other.json", "a"));
@@ -175,7 +175,7 @@ mod tests {
             m.input_bus("THRESHOLD", 5);
             let event = m.output("SPAD_EVENT");
             m.gate_into(CellKind::Inv, &[[timed, event_type][bus][1]], event);
-            let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+            let own = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
             CONTRACTS[1].holds(&own, &built_in)
         };
         assert_eq!(event_of(0), Ok(()));
@@ -198,7 +198,7 @@ mod tests {
             let one = m.gate(CellKind::Xnor2, &[clk, clk]);
             let stop = stop(&mut m, [one, memory_reset, clk, reset]);
             m.gate_into(CellKind::Buf, &[stop], local_stop);
-            let expected = Expected {
+            let expected = CountDownSetup {
                 has_memory: true,
                 after_borrow: AfterBorrow::Hold,
                 step_periods: 1,
@@ -286,7 +286,7 @@ mod tests {
                     }
                 }
             }
-            let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+            let own = OwnBlock::from_module("mine.json", m.finish().unwrap(), "");
             let mut contracts = CONTRACTS.iter();
             let contract = contracts.find(|contract| contract.name == name).unwrap();
             contract.holds(&own, &built_in).unwrap_err()

@@ -5,7 +5,7 @@
 //!   Probes::of_macropixel(netlist, row, col) ─┬─► probes.net(Probe::LocalStop)  ─► NetId
 //!                                             ├─► probes.bus(Probe::Shift)      ─► NetIds, bit 0 first
 //!   LoadProbe::Write.net(netlist)             ├─► probes.bin(3)                 ─► NetIds of a bin's count
-//!   SensorPins::of(netlist)                   └─► probes.path(Probe::Strobe)    ─► dotted path, for viewers
+//!   SensorPins::find(netlist)                 └─► probes.path(Probe::Strobe)    ─► dotted path, for viewers
 //! ```
 //!
 //! | file | what it has |
@@ -238,11 +238,11 @@ impl Probes {
     pub fn of_macropixel(netlist: &Netlist, row: usize, col: usize) -> Self {
         let name = array::pixel_name(row, col);
         assert!(netlist.scope(&name).is_some(), "no macropixel {name}");
-        Self::at(netlist, &name)
+        Self::below_instance(netlist, &name)
     }
 
     /// Handles of what there is of a macropixel below the instance at `path`; an empty path is the top itself.
-    pub fn at(netlist: &Netlist, path: &str) -> Self {
+    pub fn below_instance(netlist: &Netlist, path: &str) -> Self {
         Self::resolve(netlist, path, |probe| probe.path(path))
     }
 

@@ -21,7 +21,7 @@ impl LoadPins {
     ///
     /// # Panics
     /// When the netlist is neither.
-    pub fn of(netlist: &Netlist) -> Self {
+    pub fn find(netlist: &Netlist) -> Self {
         LoadPins {
             resetb: top_bus(netlist, "RESETB")[0],
             clk: LoadProbe::Clk.net(netlist),
@@ -47,7 +47,7 @@ impl ReadPins {
     ///
     /// # Panics
     /// When the netlist is neither.
-    pub fn of(netlist: &Netlist) -> Self {
+    pub fn find(netlist: &Netlist) -> Self {
         ReadPins {
             clk: ReadProbe::Clk.net(netlist),
             enable: ReadProbe::Enable.net(netlist),
@@ -88,12 +88,12 @@ impl SensorPins {
     ///
     /// # Panics
     /// When the netlist is no sensor.
-    pub fn of(netlist: &Netlist) -> Self {
+    pub fn find(netlist: &Netlist) -> Self {
         let bus = |name| top_bus(netlist, name);
         let pin = |name| bus(name)[0];
         SensorPins {
-            load: LoadPins::of(netlist),
-            read: ReadPins::of(netlist),
+            load: LoadPins::find(netlist),
+            read: ReadPins::find(netlist),
             clk: pin("CLK"),
             stop: pin("STOP"),
             enable: pin("ENABLE"),

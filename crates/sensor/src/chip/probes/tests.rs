@@ -55,7 +55,7 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters_and_tdcs() {
         assert_eq!(probes.bins().len(), config.bins);
         assert_eq!(
             probes.net(Probe::LocalStop),
-            SensorPins::of(&netlist).local_stop[5]
+            SensorPins::find(&netlist).local_stop[5]
         );
     }
 }

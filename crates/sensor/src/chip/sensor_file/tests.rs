@@ -259,7 +259,7 @@ proptest! {
 /// Release of trapped carriers: slower in the cold, with more of them left after the dead time.
 #[test]
 fn afterpulses_follow_the_temperature_of_the_junction() {
-    let of = |activation_ev: f64, temperature_c: Option<f64>| {
+    let afterpulses = |activation_ev: f64, temperature_c: Option<f64>| {
         let config = SensorConfig {
             afterpulse_probability: 0.02,
             afterpulse_activation_ev: activation_ev,
@@ -268,16 +268,20 @@ fn afterpulses_follow_the_temperature_of_the_junction() {
         };
         config.afterpulses()
     };
-    for same in [of(0.0, Some(-40.0)), of(0.3, None), of(0.3, Some(50.0))] {
+    for same in [
+        afterpulses(0.0, Some(-40.0)),
+        afterpulses(0.3, None),
+        afterpulses(0.3, Some(50.0)),
+    ] {
         assert_eq!(same, (0.02, 5.0 * 1e-9));
     }
-    let (cold, time_s) = of(0.15, Some(0.0));
+    let (cold, time_s) = afterpulses(0.15, Some(0.0));
     let longer = f64::exp(0.15 / 8.617_333_262e-5 * (1.0 / 273.15 - 1.0 / 323.15));
     assert!((time_s / (5e-9 * longer) - 1.0).abs() < 1e-9, "{time_s}");
     let trapped = 0.02 * f64::exp(8.0 / 5.0);
     let left = trapped * f64::exp(-8.0 / (5.0 * longer));
     assert!((cold / left - 1.0).abs() < 1e-9, "{cold} {left}");
-    assert!(of(0.15, Some(120.0)).0 < 0.02);
+    assert!(afterpulses(0.15, Some(120.0)).0 < 0.02);
     // In the deepest cold time constants have an end.
-    assert_eq!(of(2.0, Some(-55.0)).1, 1e-3);
+    assert_eq!(afterpulses(2.0, Some(-55.0)).1, 1e-3);
 }

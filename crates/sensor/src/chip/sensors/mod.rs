@@ -56,8 +56,8 @@ mod tests {
         let sensor = quantic4x4();
         let copy = Sensor::from(&sensor);
         assert!(std::ptr::eq(sensor.timing(), copy.timing()));
-        assert_eq!(*sensor.timing(), ChipTiming::of(&sensor));
-        let slow = sensor.made_of(&sensor.silicon().at(1.5));
+        assert_eq!(*sensor.timing(), ChipTiming::new(&sensor));
+        let slow = sensor.made_of(&sensor.silicon().with_factor(1.5));
         assert!(slow.timing().ripple() > sensor.timing().ripple());
         assert!(slow != sensor && copy == sensor);
     }

@@ -65,8 +65,8 @@ impl Sensor {
             ..
         } = &*self.0;
         delays.get_or_init(|| {
-            if *silicon == Silicon::of(config) {
-                MeasuredDelays::known(config)
+            if *silicon == Silicon::new(config) {
+                MeasuredDelays::cached(config)
             } else {
                 MeasuredDelays::measure(config, silicon)
             }
@@ -82,7 +82,7 @@ impl Sensor {
             ..
         } = &*self.0;
         (config.tdc == Tdc::DelayLine).then(|| {
-            let lines = delay_lines.get_or_init(|| DelayLines::of(config, silicon));
+            let lines = delay_lines.get_or_init(|| DelayLines::measured(config, silicon));
             lines.taps(number)
         })
     }
@@ -128,7 +128,7 @@ impl Sensor {
             clk_skew_ps: 0.0,
             ..self.0.config.clone()
         };
-        let silicon = Silicon::of(&config);
+        let silicon = Silicon::new(&config);
         let is_alike = config == self.0.config || !self.has_own_laws();
         if is_alike && silicon == self.0.silicon {
             return self.clone();
@@ -169,7 +169,7 @@ impl From<SensorConfig> for Sensor {
     /// A sensor of this description, made of the library in its corner. The description must have passed
     /// [`SensorConfig::check`].
     fn from(config: SensorConfig) -> Self {
-        let silicon = Silicon::of(&config);
+        let silicon = Silicon::new(&config);
         Self::from_parts(config, silicon)
     }
 }

@@ -18,7 +18,7 @@ use super::library_text::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::files::instead_of;
-use crate::liberty::{Characterised, Environment, Liberty};
+use crate::liberty::{CharacterisedNetlist, Environment, Liberty};
 use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.
@@ -38,7 +38,7 @@ pub struct FromFile {
 
 /// Everything that decides what a file becomes.
 #[derive(Clone, PartialEq, Eq, Hash)]
-struct Wanted {
+struct LibraryKey {
     path: PathBuf,
     cells: String,
     input_slew_ps: u64,
@@ -53,7 +53,7 @@ impl CellLibrary {
     ///
     /// # Errors
     /// The key at fault and what is wrong: a file that cannot be read or is no library, a corner without one, cells that are not there.
-    pub fn of(config: &SensorConfig) -> Result<Self, (&'static str, String)> {
+    pub fn from_config(config: &SensorConfig) -> Result<Self, (&'static str, String)> {
         let (key, path) = match config.corner {
             Corner::Typ => ("liberty", &config.liberty),
             Corner::Slow => ("liberty_slow", &config.liberty_slow),
@@ -69,13 +69,13 @@ impl CellLibrary {
                 format!("corner = {corner:?} with a library in another corner; give {key}, too");
             return Err((key, message));
         }
-        let wanted = Wanted {
+        let wanted = LibraryKey {
             path: path.clone(),
             cells: config.liberty_cells.clone(),
             input_slew_ps: config.input_slew_ps.to_bits(),
             wire_ff: config.wire_ff.to_bits(),
         };
-        static READ: LazyLock<Mutex<HashMap<Wanted, &'static FromFile>>> =
+        static READ: LazyLock<Mutex<HashMap<LibraryKey, &'static FromFile>>> =
             LazyLock::new(Mutex::default);
         let mut read = READ.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = read.get(&wanted) {
@@ -110,7 +110,7 @@ impl CellLibrary {
         // A kind's limits are the largest that any flip-flop of the QuantIC4x4's macropixel has.
         let mut nominal = liberty.nominal(&environment);
         let pixel = Netlist::elaborate(&macropixel::circuit(&SensorConfig::default()));
-        let placed = Characterised::new(&pixel, &liberty, &environment);
+        let placed = CharacterisedNetlist::new(&pixel, &liberty, &environment);
         let [(shortest_fs, of_shortest), (longest_fs, of_longest)] =
             placed.extreme_delays(&pixel, &liberty);
         if longest_fs > f64::from(u32::MAX) {
@@ -173,7 +173,7 @@ impl FromFile {
                 .or_insert_with(|| scope.module.cell(front_end::TOGGLE));
             let Some(toggle) = *toggle else { continue };
             let cell = netlist.cells_of(index).start + toggle;
-            let mut delays = *timing.of(cell);
+            let mut delays = *timing.cell_delays(cell);
             for arc in delays.as_flattened_mut() {
                 let slower = arc.rise_fs.max(arc.fall_fs);
                 (arc.rise_fs, arc.fall_fs) = (slower, slower);
@@ -184,8 +184,8 @@ impl FromFile {
     }
 
     /// A netlist in its cells, each macropixel by itself.
-    pub fn characterised(&self, netlist: &Netlist) -> Characterised {
-        Characterised::with_blocks(netlist, &self.liberty, &self.environment, |module| {
+    pub fn characterised(&self, netlist: &Netlist) -> CharacterisedNetlist {
+        CharacterisedNetlist::with_blocks(netlist, &self.liberty, &self.environment, |module| {
             module.name() == macropixel::NAME
         })
     }

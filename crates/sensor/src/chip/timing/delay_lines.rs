@@ -41,7 +41,7 @@ const KEPT: usize = 8;
 
 impl DelayLines {
     /// Those of a sensor whose TDC has some, perhaps measured before.
-    pub(crate) fn of(config: &SensorConfig, silicon: &Silicon) -> Arc<Self> {
+    pub(crate) fn measured(config: &SensorConfig, silicon: &Silicon) -> Arc<Self> {
         static MEASURED: Mutex<Vec<(Lines, Arc<DelayLines>)>> = Mutex::new(Vec::new());
         let lines = Lines {
             bins: config.bins,

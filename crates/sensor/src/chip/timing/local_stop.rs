@@ -13,9 +13,9 @@ use std::cmp::Reverse;
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
 
-use super::macropixel::{MacropixelCircuit, Span, hull, spread};
+use super::macropixel::{DelaySpan, MacropixelCircuit, hull, spread};
 use crate::chip::p_counter::Rises;
-use crate::chip::p_counter::count_down::{CountDown, Counted, Expected};
+use crate::chip::p_counter::count_down::{CountDown, CountDownResult, CountDownSetup};
 use crate::chip::{Probes, SensorConfig, p_counter};
 use crate::kernel::LANES;
 use crate::netlist::{Netlist, Timing};
@@ -25,7 +25,7 @@ use crate::units::Time;
 #[derive(Debug)]
 pub struct LocalStopDelays {
     /// Earliest and latest by static timing.
-    bounds: Span,
+    bounds: DelaySpan,
     counter: Counter,
 }
 
@@ -37,7 +37,7 @@ struct Counter {
     probes: Probes,
     timing: Timing,
     /// What 64 start values do each, once it has been measured.
-    measured: Vec<OnceLock<Box<[Counted]>>>,
+    measured: Vec<OnceLock<Box<[CountDownResult]>>>,
 }
 
 impl LocalStopDelays {
@@ -46,7 +46,7 @@ impl LocalStopDelays {
         config: &SensorConfig,
         circuit: &MacropixelCircuit,
         timing: &Timing,
-        bounds: Span,
+        bounds: DelaySpan,
     ) -> Self {
         LocalStopDelays {
             bounds,
@@ -55,7 +55,7 @@ impl LocalStopDelays {
     }
 
     /// Earliest and latest by static timing: no start value is outside.
-    pub fn bounds(&self) -> Span {
+    pub fn bounds(&self) -> DelaySpan {
         self.bounds
     }
 
@@ -64,7 +64,10 @@ impl LocalStopDelays {
         if spread(self.bounds) == Time::ZERO {
             return self.bounds.1;
         }
-        self.counter.counted(start).delay.unwrap_or(self.bounds.1)
+        self.counter
+            .count_down(start)
+            .delay
+            .unwrap_or(self.bounds.1)
     }
 
     /// The count that raises LOCAL_STOP from a start value with these delays, the first count being 0, if that is not the one that the
@@ -77,13 +80,13 @@ impl LocalStopDelays {
         if spread(self.bounds) == Time::ZERO && config.p_counter.row().has_memory {
             return None;
         }
-        let found = self.counter.counted(start).rises[0];
-        let expected = Rises::of(config, start).map(|rises| rises.first);
+        let found = self.counter.count_down(start).rises[0];
+        let expected = Rises::from_start_value(config, start).map(|rises| rises.first);
         (found.map(i64::from) != expected).then_some(found)
     }
 
     /// The earliest and the latest delay of all start values.
-    pub fn span(&self) -> Span {
+    pub fn span(&self) -> DelaySpan {
         let delays = self.starts().map(|start| self.of_start(start));
         let spans = delays.map(|delay| (delay, delay));
         spans.reduce(hull).expect("a counter has start values")
@@ -93,7 +96,7 @@ impl LocalStopDelays {
     /// all.
     pub fn latest(&self) -> (u16, Time) {
         let simulated = |start| {
-            let delay = self.counter.counted(start).delay;
+            let delay = self.counter.count_down(start).delay;
             (delay.unwrap_or(self.bounds.1), start)
         };
         // The least of the start values that take as long.
@@ -132,22 +135,22 @@ impl Counter {
         }
     }
 
-    fn counted(&self, start: u16) -> Counted {
+    fn count_down(&self, start: u16) -> CountDownResult {
         let (chunk, place) = (usize::from(start) / LANES, usize::from(start) % LANES);
         self.measured[chunk].get_or_init(|| self.measure(chunk))[place]
     }
 
     /// What the start values of one chunk do.
-    fn measure(&self, chunk: usize) -> Box<[Counted]> {
+    fn measure(&self, chunk: usize) -> Box<[CountDownResult]> {
         let first = chunk * LANES;
         let last = (first + LANES - 1).min(self.config.largest_start().into());
         let starts: Vec<u16> = (first..=last).map(|start| start as u16).collect();
         let codes = self.config.load_codes(&starts);
-        let expected = Expected::of_sensor(&self.config);
+        let expected = CountDownSetup::of_sensor(&self.config);
         let counter = (&self.netlist, &self.probes);
         let counted = CountDown::new(counter, &self.timing, &codes, expected).measure(1);
         // A LOCAL_STOP that is unknown or no clean edge raises nothing that can be counted on.
-        let counted = counted.unwrap_or_else(|_| vec![Counted::NEVER; starts.len()]);
+        let counted = counted.unwrap_or_else(|_| vec![CountDownResult::NEVER; starts.len()]);
         counted.into()
     }
 }

@@ -30,15 +30,15 @@ use crate::units::Time;
 pub use counter::CounterDelays;
 
 /// Earliest and latest.
-pub type Span = (Time, Time);
+pub type DelaySpan = (Time, Time);
 
 /// The width of a span.
-pub fn spread(span: Span) -> Time {
+pub fn spread(span: DelaySpan) -> Time {
     span.1 - span.0
 }
 
 /// The span from the earlier beginning to the later end.
-pub(crate) fn hull(a: Span, b: Span) -> Span {
+pub(crate) fn hull(a: DelaySpan, b: DelaySpan) -> DelaySpan {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
@@ -227,7 +227,7 @@ impl<'c> MacropixelPaths<'c> {
 
     /// What an edge of CLK changes.
     pub(crate) fn after_clk(&self, edge: Edge) -> Arrivals<'c> {
-        self.after(
+        self.arrivals_after(
             Probe::Clk,
             &[edge],
             &[
@@ -274,7 +274,7 @@ impl<'c> MacropixelPaths<'c> {
     /// What a change of RUN, the macropixels' ENABLE, changes.
     pub(crate) fn after_enable(&self) -> Arrivals<'c> {
         let cuts = [Probe::CounterReset, Probe::CounterClk];
-        self.after(Probe::Enable, &Edge::BOTH, &cuts)
+        self.arrivals_after(Probe::Enable, &Edge::BOTH, &cuts)
     }
 
     /// The flip-flop of a bin's lowest bit, and HIT's rise (latest) and fall (earliest) → its clock. None where HIT does not clock it.
@@ -301,24 +301,28 @@ impl<'c> MacropixelPaths<'c> {
     fn block_to_counter_clk(&self) -> Option<Time> {
         self.circuit.probes.find(Probe::Block)?;
         let cuts = [Probe::CounterClk, self.circuit.probes.latched_probe()];
-        let blocked = self.after(Probe::Block, &[Edge::Rise], &cuts);
+        let blocked = self.arrivals_after(Probe::Block, &[Edge::Rise], &cuts);
         let counter_clk = self.circuit.probes.net(Probe::CounterClk);
         Some(blocked.edge_window(counter_clk, Edge::Fall)?.0)
     }
 
     /// TOGGLE → PHOTONS, of all SPADs and either edge.
-    fn joining(&self) -> Option<Span> {
+    fn joining(&self) -> Option<DelaySpan> {
         let probes = &self.circuit.probes;
         let photons = probes.find(Probe::Photons)?[0];
-        let of = |&toggle: &NetId| {
+        let arrival_window = |&toggle: &NetId| {
             let starts = Edge::BOTH.map(|edge| (toggle, edge));
             let arrivals = self.analysis.arrivals(&starts, probes.latched());
             arrivals.expect("every loop is cut").window(photons)
         };
-        probes.toggles().iter().filter_map(of).reduce(hull)
+        probes
+            .toggles()
+            .iter()
+            .filter_map(arrival_window)
+            .reduce(hull)
     }
 
-    fn after(&self, from: Probe, edges: &[Edge], cuts: &[Probe]) -> Arrivals<'c> {
+    fn arrivals_after(&self, from: Probe, edges: &[Edge], cuts: &[Probe]) -> Arrivals<'c> {
         let probes = &self.circuit.probes;
         let starts: Vec<(NetId, Edge)> =
             edges.iter().map(|&edge| (probes.net(from), edge)).collect();
@@ -360,13 +364,13 @@ impl<'c> MacropixelPaths<'c> {
 
     /// Clock → an output rises, falls, of one flip-flop.
     fn clock_to_q(&self, cell: usize, output: usize) -> (Time, Time) {
-        let clock = self.timing.of(cell)[1][output];
-        let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.to(to).into()));
+        let clock = self.timing.cell_delays(cell)[1][output];
+        let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.delay_fs(to).into()));
         (rise, fall)
     }
 
     /// SPAD_RAW rises → what CLK samples, of each SPAD.
-    pub(crate) fn front_end_latency(&self) -> Vec<Span> {
+    pub(crate) fn front_end_latency(&self) -> Vec<DelaySpan> {
         if self.circuit.sampled.is_empty() {
             let toggles = self.circuit.toggles.iter();
             return toggles.map(|&toggle| self.clock_to_q(toggle, 0)).collect();
@@ -421,14 +425,14 @@ impl<'c> MacropixelPaths<'c> {
     }
 
     /// Fastest and slowest arc of every cell of some kinds.
-    fn arcs(&self, is: impl Fn(CellKind) -> bool) -> impl Iterator<Item = Option<Span>> {
+    fn arcs(&self, is: impl Fn(CellKind) -> bool) -> impl Iterator<Item = Option<DelaySpan>> {
         let cells = self.circuit.netlist.cells().iter().enumerate();
         cells
             .filter(move |(_, leaf)| is(leaf.kind))
             .map(|(cell, leaf)| {
                 let pins = 0..leaf.kind.inputs().len();
                 let arcs = pins.filter(|&pin| leaf.kind.triggers(pin)).flat_map(|pin| {
-                    let arcs = &self.timing.of(cell)[pin][..leaf.kind.outputs().len()];
+                    let arcs = &self.timing.cell_delays(cell)[pin][..leaf.kind.outputs().len()];
                     arcs.iter().flat_map(|arc| [arc.rise_fs, arc.fall_fs])
                 });
                 let arcs = arcs.map(|fs| Time::from_fs(fs.into()));
@@ -454,30 +458,30 @@ pub struct MacropixelDelays {
     /// The slowest pulse shaper, where there are any.
     pub shaper: Option<ShaperDelays>,
     /// TOGGLE → PHOTONS, where delay lines time what SPADs have in common.
-    pub joining: Option<Span>,
+    pub joining: Option<DelaySpan>,
     /// CLK rises → all that CLK samples has settled, latest, which of built-in blocks is SPAD_EVENT; nothing where delay lines time
     /// photons. A path that no values excite may be longer than any that they do: see the timing analysis of the correlation block.
     pub event: Time,
     /// CLK rises → the stage of SHIFT changes that each bin's HIT takes, bin 0 first; none where delay lines time photons.
-    pub shift: Vec<Span>,
+    pub shift: Vec<DelaySpan>,
     /// STOP rises → COUNTER_RESET rises.
-    pub reset: Span,
+    pub reset: DelaySpan,
     /// STOP rises → COUNTER_RESET falls.
-    pub release: Span,
+    pub release: DelaySpan,
     /// STOP rises → STOP_D rises, behind the delay chain.
-    pub stop_d: Span,
+    pub stop_d: DelaySpan,
     /// STOP rises → the pulse that becomes COUNTER_RESET rises, falls.
-    pub pulse: (Span, Span),
+    pub pulse: (DelaySpan, DelaySpan),
     /// STOP rises → RUN changes.
-    pub run: Span,
+    pub run: DelaySpan,
     /// STOP rises → RUN rises.
-    pub run_rise: Span,
+    pub run_rise: DelaySpan,
     /// STOP rises → STROBE rises, where STOP makes the strobe: in the conventional mode.
-    pub stop_strobe: Span,
+    pub stop_strobe: DelaySpan,
     /// STOP rises → what freezes the window rises, conventional mode: STROBE, or SAMPLE_CLK before it.
-    pub stop_sample: Span,
+    pub stop_sample: DelaySpan,
     /// STOP rises → HIT's reset ends, conventional mode.
-    pub stop_hit_release: Span,
+    pub stop_hit_release: DelaySpan,
     /// STROBE rises → HIT rises, latest.
     pub strobe_to_hit: Time,
     /// The flip-flop of a bin's lowest bit, and HIT's rise (latest) and fall (earliest) → its clock, where HIT clocks it.
@@ -492,7 +496,7 @@ pub struct MacropixelDelays {
 
 impl MacropixelDelays {
     /// Measures them.
-    pub(crate) fn of(paths: &MacropixelPaths<'_>) -> Self {
+    pub(crate) fn measure(paths: &MacropixelPaths<'_>) -> Self {
         let circuit = paths.circuit;
         let net = |probe| circuit.probes.net(probe);
         let rise = paths.after_clk(Edge::Rise);
@@ -536,19 +540,19 @@ impl MacropixelDelays {
     }
 }
 
-fn edge(arrivals: &Arrivals<'_>, net: NetId, edge: Edge) -> Span {
+fn edge(arrivals: &Arrivals<'_>, net: NetId, edge: Edge) -> DelaySpan {
     let window = arrivals.edge_window(net, edge);
     window.expect("the macropixel connects these")
 }
 
-fn changes(arrivals: &Arrivals<'_>, net: NetId) -> Span {
+fn changes(arrivals: &Arrivals<'_>, net: NetId) -> DelaySpan {
     arrivals.window(net).expect("the macropixel connects these")
 }
 
-fn latest(windows: impl Iterator<Item = Option<Span>>) -> Option<Time> {
+fn latest(windows: impl Iterator<Item = Option<DelaySpan>>) -> Option<Time> {
     windows.flatten().map(|window| window.1).max()
 }
 
-fn earliest(windows: impl Iterator<Item = Option<Span>>) -> Option<Time> {
+fn earliest(windows: impl Iterator<Item = Option<DelaySpan>>) -> Option<Time> {
     windows.flatten().map(|window| window.0).min()
 }

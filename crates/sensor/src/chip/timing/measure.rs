@@ -25,8 +25,8 @@ pub(in crate::chip) struct MeasuredDelays {
 
 impl ChipTiming {
     /// The timing of a sensor without mismatch, in its corner at its temperature.
-    pub fn of(config: &SensorConfig) -> Self {
-        MeasuredDelays::known(config).timing
+    pub fn new(config: &SensorConfig) -> Self {
+        MeasuredDelays::cached(config).timing
     }
 
     /// Measures macropixel (0, 0) of a sensor made of this silicon: the latest that each signal comes.
@@ -55,19 +55,20 @@ impl ResetPulse {
         let circuit = MacropixelCircuit::new(config, (0, 0));
         let timing = silicon.timing(&circuit.netlist);
         let paths = circuit.paths(&timing);
-        let delays = MacropixelDelays::of(&paths);
-        let counter = CounterDelays::of(&paths, &delays);
+        let delays = MacropixelDelays::measure(&paths);
+        let counter = CounterDelays::measure(&paths, &delays);
         let limits = (&silicon.limits(Limits::Kept), silicon.corner);
-        Self::among(&circuit, (&delays, &counter), limits)
+        Self::from_delays(&circuit, (&delays, &counter), limits)
     }
 
     /// The same of delays that are known.
-    pub(crate) fn among(
+    pub(crate) fn from_delays(
         circuit: &MacropixelCircuit,
         (delays, counter): (&MacropixelDelays, &CounterDelays),
         (library, corner): (&Library, Corner),
     ) -> Self {
-        let limit_of = |kind, check| Time::from_fs(library.checks(kind).at(check, corner).into());
+        let limit_of =
+            |kind, check| Time::from_fs(library.checks(kind).limit_fs(check, corner).into());
         let limit = |check| {
             let limits = circuit.counting_kinds().map(|kind| limit_of(kind, check));
             limits.max().expect("a P-counter counts")
@@ -102,15 +103,15 @@ impl MeasuredDelays {
     ///
     /// Measured once for every circuit and corner, and remembered: a measurement takes 0.6 ms, four times as long as
     /// elaborating the macropixel; and window laws are asked for by the thousand.
-    pub(in crate::chip) fn known(config: &SensorConfig) -> Self {
+    pub(in crate::chip) fn cached(config: &SensorConfig) -> Self {
         static MEASURED: LazyLock<Mutex<HashMap<Circuit, MeasuredDelays>>> =
             LazyLock::new(Mutex::default);
         let measured = || MEASURED.lock().unwrap_or_else(PoisonError::into_inner);
-        let circuit = Circuit::of(config).expect("checked");
+        let circuit = Circuit::new(config).expect("checked");
         if let Some(known) = measured().get(&circuit) {
             return known.clone();
         }
-        let delays = Self::measure(config, &Silicon::of(config));
+        let delays = Self::measure(config, &Silicon::new(config));
         measured().insert(circuit, delays.clone());
         delays
     }
@@ -120,15 +121,16 @@ impl MeasuredDelays {
         let circuit = MacropixelCircuit::new(config, (0, 0));
         let timing = silicon.timing(&circuit.netlist);
         let paths = circuit.paths(&timing);
-        let delays = MacropixelDelays::of(&paths);
-        let counter = CounterDelays::of(&paths, &delays);
+        let delays = MacropixelDelays::measure(&paths);
+        let counter = CounterDelays::measure(&paths, &delays);
         let library = silicon.limits(Limits::Kept);
-        let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, silicon.corner));
+        let reset =
+            ResetPulse::from_delays(&circuit, (&delays, &counter), (&library, silicon.corner));
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
         let clk = Requirements::behind(&circuit.netlist, clk, &library, silicon.corner);
         let (_, clk) = circuit.split(clk.all(), false);
         let limit_of = |kind, check| {
-            let limit = library.checks(kind).at(check, silicon.corner);
+            let limit = library.checks(kind).limit_fs(check, silicon.corner);
             Time::from_fs(limit.into())
         };
         // SPADs, SHIFT and HIT have flip-flops of this kind.
@@ -252,7 +254,7 @@ pub(super) struct Circuit {
 
 impl Circuit {
     /// Of this sensor; `None` where its corner has no library.
-    pub(super) fn of(config: &SensorConfig) -> Option<Self> {
+    pub(super) fn new(config: &SensorConfig) -> Option<Self> {
         Some(Circuit {
             spads: config.spads(),
             front_end: config.front_end,
@@ -270,7 +272,7 @@ impl Circuit {
             overflow: config.overflow,
             corner: config.corner,
             temperature: config.temperature_c.map(f64::to_bits),
-            library: CellLibrary::of(config).ok()?,
+            library: CellLibrary::from_config(config).ok()?,
         })
     }
 }

@@ -45,7 +45,7 @@ impl SensorConfig {
                 reset_stages: SHORTEST_CHAIN,
                 ..self.clone()
             };
-            Circuit::of(&config).map(|circuit| (circuit, config))
+            Circuit::new(&config).map(|circuit| (circuit, config))
         });
         let key = corners
             .each_ref()
@@ -63,7 +63,7 @@ impl SensorConfig {
 
 /// The shortest chain with which the pulse is long enough in this corner: in the cells of a library, a tenth longer than needed.
 fn sufficient_chain(config: &SensorConfig) -> usize {
-    let silicon = Silicon::of(config);
+    let silicon = Silicon::new(config);
     let is_of_file = silicon.cell_library.from_file().is_some();
     let mut stages = SHORTEST_CHAIN;
     loop {
@@ -126,7 +126,7 @@ mod tests {
             };
             config.check().unwrap();
             let counter = |reset_stages| {
-                ChipTiming::of(&SensorConfig {
+                ChipTiming::new(&SensorConfig {
                     reset_stages,
                     ..config.clone()
                 })

@@ -41,8 +41,8 @@ impl Silicon {
 
     /// That of a sensor without mismatch: its library in its corner at its temperature. The description must have passed
     /// [`SensorConfig::check`].
-    pub fn of(config: &SensorConfig) -> Self {
-        let cell_library = CellLibrary::of(config).expect("checked");
+    pub fn new(config: &SensorConfig) -> Self {
+        let cell_library = CellLibrary::from_config(config).expect("checked");
         Silicon::at_temperature(cell_library, config).expect("checked")
     }
 
@@ -63,7 +63,7 @@ impl Silicon {
 
     /// The same chip with every delay and limit times `factor`, instead of its own.
     #[must_use]
-    pub const fn at(mut self, factor: f64) -> Self {
+    pub const fn with_factor(mut self, factor: f64) -> Self {
         self.factor = factor;
         self
     }
@@ -77,7 +77,7 @@ impl Silicon {
             return Err(UnknownConditions::OfLibrary);
         }
         let factor = conditions.delay_factor();
-        Ok(self.at(factor.ok_or(UnknownConditions::Far)?))
+        Ok(self.with_factor(factor.ok_or(UnknownConditions::Far)?))
     }
 
     /// Delays of a netlist.

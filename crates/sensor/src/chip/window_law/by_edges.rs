@@ -13,7 +13,7 @@ const NEAR: Time = Time::from_fs(2);
 
 /// What a start value does. A race has its signal's time, and from when to when it must not come.
 #[derive(Debug, PartialEq)]
-enum Found {
+enum StartValueOutcome {
     Strobe {
         cause: Time,
         strobe: Time,
@@ -61,10 +61,10 @@ impl Edges {
     }
 
     /// The strobe of a P-counter that each STOP resets.
-    fn after_reset(&self, start: u16) -> Found {
+    fn after_reset(&self, start: u16) -> StartValueOutcome {
         let (timing, counter) = (&self.timing, &self.timing.counter);
         if self.period() <= counter.period + NEAR {
-            return Found::Race(
+            return StartValueOutcome::Race(
                 Conflict::SlowCounter,
                 counter.period + NEAR,
                 self.period(),
@@ -78,11 +78,16 @@ impl Edges {
             let strobe = rise + timing.local_stop_to_strobe;
             let held = timing.stop_to_hit_release - timing.removal - NEAR;
             if strobe >= held {
-                return Found::Race(Conflict::ResetStrobeAtHitReset, strobe, held, None);
+                return StartValueOutcome::Race(
+                    Conflict::ResetStrobeAtHitReset,
+                    strobe,
+                    held,
+                    None,
+                );
             }
         }
-        let Some(rises) = Rises::of(&self.config, start) else {
-            return Found::Never;
+        let Some(rises) = Rises::from_start_value(&self.config, start) else {
+            return StartValueOutcome::Never;
         };
         let no_more = timing.stop_to_reset_release - counter.removal - NEAR;
         let settled = timing.stop_to_reset + counter.settle;
@@ -93,7 +98,12 @@ impl Edges {
         for edge in self.numbers() {
             let count = self.exposure.falling(edge) + timing.clk_to_counter_clk;
             if no_more <= count && count <= surely {
-                return Found::Race(Conflict::ClkAtResetEnd, count, no_more, Some(surely));
+                return StartValueOutcome::Race(
+                    Conflict::ClkAtResetEnd,
+                    count,
+                    no_more,
+                    Some(surely),
+                );
             }
             if surely < count && count < self.end() + timing.stop_to_reset {
                 let since = counts - rises.first;
@@ -104,36 +114,36 @@ impl Edges {
             }
         }
         let (Some(&first), Some(&last)) = (stops.first(), stops.last()) else {
-            return Found::Never;
+            return StartValueOutcome::Never;
         };
         let waits = rises.every.is_none();
         let strobe = self.strobe(last);
         let latched = self.end() + timing.stop_to_hit_reset - timing.strobe_to_hit;
         if strobe > latched + NEAR && waits {
-            return Found::Never;
+            return StartValueOutcome::Never;
         }
         let surely = self.end() + self.surely_counts();
         if strobe >= surely {
             let until = waits.then_some(latched + NEAR);
-            return Found::Race(Conflict::StrobeAtNextReset, strobe, surely, until);
+            return StartValueOutcome::Race(Conflict::StrobeAtNextReset, strobe, surely, until);
         }
         let ready = timing.stop_to_hit_release + timing.recovery + NEAR;
         let strobe = self.strobe(first);
         if strobe >= self.surely_counts() && strobe <= ready {
-            return Found::Race(
+            return StartValueOutcome::Race(
                 Conflict::StrobeAtReset,
                 strobe,
                 self.surely_counts(),
                 Some(ready),
             );
         }
-        self.counted(first, stops.len() == 1)
+        self.strobe_outcome(first, stops.len() == 1)
     }
 
-    fn counted(&self, counted: i64, is_regular: bool) -> Found {
+    fn strobe_outcome(&self, counted: i64, is_regular: bool) -> StartValueOutcome {
         let strobe = self.strobe(counted);
         let cause = strobe - self.timing.local_stop_to_strobe;
-        Found::Strobe {
+        StartValueOutcome::Strobe {
             cause,
             strobe,
             counted,
@@ -142,22 +152,27 @@ impl Edges {
     }
 
     /// The strobe of a P-counter that runs on from the exposure's first STOP edge.
-    fn running_on(&self, start: u16) -> Found {
+    fn running_on(&self, start: u16) -> StartValueOutcome {
         let (timing, counter) = (&self.timing, &self.timing.counter);
         let enabled = timing.stop_to_enabled;
         let until = enabled + timing.clk_to_counter_clk + counter.clock_high + NEAR;
         for edge in self.numbers() {
             let rise = self.exposure.rising(edge);
             if enabled - NEAR <= rise && rise <= until {
-                return Found::Race(Conflict::ClkAtEnable, rise, enabled - NEAR, Some(until));
+                return StartValueOutcome::Race(
+                    Conflict::ClkAtEnable,
+                    rise,
+                    enabled - NEAR,
+                    Some(until),
+                );
             }
         }
         let Some(Rises {
             first,
             every: Some(every),
-        }) = Rises::of(&self.config, start)
+        }) = Rises::from_start_value(&self.config, start)
         else {
-            return Found::Never;
+            return StartValueOutcome::Never;
         };
         let periods = i64::from(self.exposure.stop_periods);
         let last = periods * i64::from(self.exposure.laser_cycles);
@@ -173,11 +188,16 @@ impl Edges {
             .filter(|&&edge| first == 0 && fall(edge) <= enabled + NEAR)
         {
             let (comes, race) = (fall(edge), Conflict::LocalStopAtEnable);
-            return Found::Race(race, comes, comes.min(enabled), Some(comes.max(enabled)));
+            return StartValueOutcome::Race(
+                race,
+                comes,
+                comes.min(enabled),
+                Some(comes.max(enabled)),
+            );
         }
         if stops.last() == Some(&last) {
             let (comes, end) = (fall(last), self.exposure.end() + enabled);
-            return Found::Race(
+            return StartValueOutcome::Race(
                 Conflict::LocalStopAtEnable,
                 comes,
                 comes.min(enabled),
@@ -185,7 +205,7 @@ impl Edges {
             );
         }
         if counted + first > last {
-            return Found::Never;
+            return StartValueOutcome::Never;
         }
         let from = self.surely_counts();
         let to = timing.stop_to_hit_release + timing.recovery + NEAR;
@@ -193,14 +213,19 @@ impl Edges {
             let strobe = self.strobe(edge.rem_euclid(periods));
             for strobe in [strobe, strobe - self.end()] {
                 if from <= strobe && strobe <= to {
-                    return Found::Race(Conflict::StrobeAtReset, strobe, from, Some(to));
+                    return StartValueOutcome::Race(
+                        Conflict::StrobeAtReset,
+                        strobe,
+                        from,
+                        Some(to),
+                    );
                 }
             }
         }
-        self.counted(counted + first, periods == every)
+        self.strobe_outcome(counted + first, periods == every)
     }
 
-    fn strobed(&self, start: u16) -> Found {
+    fn strobed(&self, start: u16) -> StartValueOutcome {
         let timing = &self.timing;
         let event = timing.clk_to_event + timing.setup + NEAR;
         if self.config.tdc.has_clk_bins() && self.period() <= event {
@@ -208,18 +233,18 @@ impl Edges {
                 Tdc::Counter => Conflict::SlowPath,
                 _ => Conflict::SlowCorrelation,
             };
-            return Found::Race(what, event, self.period(), None);
+            return StartValueOutcome::Race(what, event, self.period(), None);
         }
         match self.config.mode {
             Mode::Conventional if timing.stop_to_strobe <= timing.stop_to_hit_ready + NEAR => {
-                Found::Race(
+                StartValueOutcome::Race(
                     Conflict::StrobeAtReset,
                     timing.stop_to_strobe,
                     Time::ZERO,
                     Some(timing.stop_to_hit_ready + NEAR),
                 )
             }
-            Mode::Conventional => Found::Strobe {
+            Mode::Conventional => StartValueOutcome::Strobe {
                 cause: self.end(),
                 strobe: self.end() + timing.stop_to_strobe,
                 counted: 0,
@@ -231,9 +256,9 @@ impl Edges {
     }
 
     /// The window as well: the edge that takes the photons of bin 0, and what the strobe has left.
-    fn window(&self, start: u16) -> (Found, Option<(i64, Time)>) {
+    fn window(&self, start: u16) -> (StartValueOutcome, Option<(i64, Time)>) {
         let found = self.strobed(start);
-        let Found::Strobe {
+        let StartValueOutcome::Strobe {
             cause,
             strobe,
             counted,
@@ -254,7 +279,7 @@ impl Edges {
             if is_clocked && from <= strobe && strobe <= to {
                 let fall = self.exposure.falling(counted);
                 let race = match self.config.mode {
-                    Mode::Guided => Found::Race(
+                    Mode::Guided => StartValueOutcome::Race(
                         Conflict::StrobeAtShift,
                         strobe - fall,
                         from - fall,
@@ -264,7 +289,12 @@ impl Edges {
                         let strobe = strobe - cause;
                         let (from, to) =
                             (strobe - timing.setup - NEAR, strobe + timing.hold + NEAR);
-                        Found::Race(Conflict::ShiftAtStrobe, shift - cause, from, Some(to))
+                        StartValueOutcome::Race(
+                            Conflict::ShiftAtStrobe,
+                            shift - cause,
+                            from,
+                            Some(to),
+                        )
                     }
                 };
                 return (race, None);
@@ -279,7 +309,7 @@ impl Edges {
             edge += 1;
         }
         if !is_regular {
-            return (Found::Irregular, None);
+            return (StartValueOutcome::Irregular, None);
         }
         let bins = self.config.bins as i64;
         (found, last.map(|edge| (edge - bins, slack)))
@@ -288,10 +318,10 @@ impl Edges {
     /// The window of a counter TDC whose START rises at `rises`.
     fn counted_by_clk(
         &self,
-        found: Found,
+        found: StartValueOutcome,
         rises: Time,
         counted: i64,
-    ) -> (Found, Option<(i64, Time)>) {
+    ) -> (StartValueOutcome, Option<(i64, Time)>) {
         let (setup, hold) = (self.timing.setup, self.timing.hold);
         let falls = self.timing.stop_to_start_falls;
         let edges = || {
@@ -301,7 +331,7 @@ impl Edges {
         for (_, clk) in edges() {
             let (from, to) = (falls - hold - NEAR, falls + setup + NEAR);
             if from <= clk && clk <= to {
-                let race = Found::Race(Conflict::StartFallsAtClk, clk, from, Some(to));
+                let race = StartValueOutcome::Race(Conflict::StartFallsAtClk, clk, from, Some(to));
                 return (race, None);
             }
         }
@@ -311,38 +341,38 @@ impl Edges {
             if from <= rises && rises <= to {
                 let fall = self.exposure.falling(counted);
                 let (from, to) = (from - fall, Some(to - fall));
-                let race = Found::Race(Conflict::StartAtClk, rises - fall, from, to);
+                let race = StartValueOutcome::Race(Conflict::StartAtClk, rises - fall, from, to);
                 return (race, None);
             }
             slack = slack.min((clk - setup - rises).max(rises - hold - clk));
         }
         let first_after = |change: Time| edges().find(|&(_, clk)| clk >= change);
         let (Some((low, _)), Some((first, _))) = (first_after(falls), first_after(rises)) else {
-            return (Found::Irregular, None);
+            return (StartValueOutcome::Irregular, None);
         };
         let is_regular = matches!(
             found,
-            Found::Strobe {
+            StartValueOutcome::Strobe {
                 is_regular: true,
                 ..
             }
         );
         let ends = first + self.config.bins as i64;
         if !is_regular || first <= low || ends > i64::from(self.exposure.stop_periods) {
-            return (Found::Irregular, None);
+            return (StartValueOutcome::Irregular, None);
         }
         (found, Some((first, slack)))
     }
 }
 
-fn of_law(law: &WindowLaw, start: u16) -> (Found, Option<(i64, Time)>) {
+fn of_law(law: &WindowLaw, start: u16) -> (StartValueOutcome, Option<(i64, Time)>) {
     match law.window(start) {
-        Window::Open(window) => {
+        WindowOutcome::Open(window) => {
             let strobe = match law.sensor.mode {
                 Mode::Guided => window.strobe_cause + law.timing.local_stop_to_strobe,
                 Mode::Conventional => window.strobe_cause + law.timing.stop_to_strobe,
             };
-            let found = Found::Strobe {
+            let found = StartValueOutcome::Strobe {
                 cause: window.strobe_cause,
                 strobe,
                 counted: window.count_edge,
@@ -354,9 +384,12 @@ fn of_law(law: &WindowLaw, start: u16) -> (Found, Option<(i64, Time)>) {
             };
             (found, Some((window.first_edge, slack)))
         }
-        Window::Never => (Found::Never, None),
-        Window::Irregular(_) => (Found::Irregular, None),
-        Window::Race(race) => (Found::Race(race.what, race.comes, race.from, race.to), None),
+        WindowOutcome::Never => (StartValueOutcome::Never, None),
+        WindowOutcome::Irregular(_) => (StartValueOutcome::Irregular, None),
+        WindowOutcome::Race(race) => (
+            StartValueOutcome::Race(race.what, race.comes, race.from, race.to),
+            None,
+        ),
     }
 }
 
@@ -399,7 +432,7 @@ prop_compose! {
             stop_to_reset_release: stop_to_reset + reset,
             stop_to_hit_release: stop_to_hit_reset + hit_reset,
             clk_period: Time::ZERO,
-            ..ChipTiming::of(&SensorConfig::default())
+            ..ChipTiming::new(&SensorConfig::default())
         }
     }
 }
@@ -420,7 +453,7 @@ fn meets() -> impl Strategy<Value = Option<Meet>> {
 }
 
 impl Edges {
-    fn meet(&mut self, meet: Option<Meet>) {
+    fn apply_meet(&mut self, meet: Option<Meet>) {
         match meet {
             None => {}
             Some(Meet::Reset(edge, off)) => {
@@ -473,7 +506,7 @@ proptest! {
         }
         let exposure = Exposure::new(&config, stop_periods, laser_cycles);
         let mut edges = Edges { config, exposure, timing };
-        edges.meet(meet);
+        edges.apply_meet(meet);
         if edges.config.tdc == Tdc::Counter {
             // START does not come before what sets it.
             edges.timing.strobe_to_hit = edges.timing.strobe_to_hit.max(Time::ZERO);
@@ -489,19 +522,19 @@ proptest! {
             prop_assert_eq!(of_law(&law, start), (found, window), "{} {:?}", start, edges.config);
             // At the periods that a cure offers nothing is too slow, and the strobe keeps its distance. It comes by way of more gates than
             // the shift register.
-            if let Window::Race(Race { what, comes, cure: Cure::Period { at_least, at_most }, .. }) = law.window(start)
+            if let WindowOutcome::Race(Race { what, comes, cure: Cure::Period { at_least, at_most }, .. }) = law.window(start)
                 && (what != Conflict::StrobeAtShift || comes > timing.clk_to_shift)
             {
                 for period in [Some(at_least), at_most].into_iter().flatten() {
                     let clock = Frequency::from_hz_f64(1.0 / period.as_s()).unwrap();
                     let cured = WindowLaw::with_timing(&edges.config, &Exposure { clock, ..exposure }, timing);
-                    if let Window::Race(race) = cured.window(start) {
+                    if let WindowOutcome::Race(race) = cured.window(start) {
                         let is_slower = race.what <= Conflict::SlowPath && what > Conflict::SlowPath;
                         prop_assert!(race.what != what && !is_slower, "{race} at {period}");
                     }
                 }
             }
-            let Window::Open(window) = law.window(start) else {
+            let WindowOutcome::Open(window) = law.window(start) else {
                 continue;
             };
             // The first pulse that comes too late for the signal that ends each bin.

@@ -27,7 +27,7 @@ impl WindowLaw {
         let (comes, ready) = (self.timing.stop_to_strobe, self.timing.stop_to_hit_ready);
         (comes <= ready + ROUNDING).then_some(Race {
             what: Conflict::StrobeAtReset,
-            after: Origin::StopRises,
+            after: RaceOrigin::StopRises,
             comes,
             from: Time::ZERO,
             to: Some(ready + ROUNDING),
@@ -49,7 +49,7 @@ impl WindowLaw {
         let to = self.timing.stop_to_hit_release + self.timing.recovery + ROUNDING;
         (from..=to).contains(&comes).then_some(Race {
             what: Conflict::StrobeAtReset,
-            after: Origin::StopRises,
+            after: RaceOrigin::StopRises,
             comes,
             from,
             to: Some(to),
@@ -76,7 +76,7 @@ impl WindowLaw {
         let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
         (arrival >= until).then_some(Race {
             what: Conflict::ResetStrobeAtHitReset,
-            after: Origin::StopRises,
+            after: RaceOrigin::StopRises,
             comes: arrival,
             from: until,
             to: None,
@@ -107,20 +107,20 @@ impl WindowLaw {
     }
 
     /// LOCAL_STOP of a counter that each STOP resets.
-    pub(super) fn with_reset(&self, start: u16) -> Result<LocalStop, Window> {
+    pub(super) fn with_reset(&self, start: u16) -> Result<LocalStop, WindowOutcome> {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let counter = &timing.counter;
         let (period, phase) = (exposure.clock.period(), exposure.stop_phase);
         let count = counter.period + ROUNDING;
         if period <= count {
             let what = Conflict::SlowCounter;
-            return Err(Window::Race(Race::too_slow(what, count, period)));
+            return Err(WindowOutcome::Race(Race::too_slow(what, count, period)));
         }
         if let Some(race) = self.short_reset().or_else(|| self.reset_strobe(start)) {
-            return Err(Window::Race(race));
+            return Err(WindowOutcome::Race(race));
         }
-        let Some(rises) = Rises::of(&self.sensor, start) else {
-            return Err(Window::Never);
+        let Some(rises) = Rises::from_start_value(&self.sensor, start) else {
+            return Err(WindowOutcome::Never);
         };
         let released = timing.stop_to_reset_release + counter.release + counter.recovery;
         let in_doubt = timing.stop_to_reset_release - counter.removal - ROUNDING
@@ -134,7 +134,7 @@ impl WindowLaw {
         if in_doubt.contains(&edge) {
             let what = Conflict::ClkAtResetEnd;
             let race = Race::with_stop(what, edge, in_doubt.into_inner(), phase, period);
-            return Err(Window::Race(race));
+            return Err(WindowOutcome::Race(race));
         }
 
         // Later than the counts that the next reset forestalls.
@@ -145,7 +145,7 @@ impl WindowLaw {
             .take(if rises.every.is_some() { usize::MAX } else { 1 })
             .collect();
         let (Some(&edge), Some(&last)) = (edges.first(), edges.last()) else {
-            return Err(Window::Never);
+            return Err(WindowOutcome::Never);
         };
         let (surely, may) = self.last_strobes();
         let (surely, may) = (end + surely, end + may);
@@ -153,12 +153,12 @@ impl WindowLaw {
         let strobe = |edge| exposure.falling(edge) + ripple + timing.local_stop_to_strobe;
         let last = strobe(last);
         if last > may && rises.every.is_none() {
-            return Err(Window::Never);
+            return Err(WindowOutcome::Never);
         }
         if last >= surely {
-            return Err(Window::Race(Race {
+            return Err(WindowOutcome::Race(Race {
                 what: Conflict::StrobeAtNextReset,
-                after: Origin::StopRises,
+                after: RaceOrigin::StopRises,
                 comes: last,
                 from: surely,
                 to: rises.every.is_none().then_some(may),
@@ -166,10 +166,10 @@ impl WindowLaw {
             }));
         }
         if let Some(race) = self.strobe_at_reset(strobe(edge)) {
-            return Err(Window::Race(race));
+            return Err(WindowOutcome::Race(race));
         }
         if let Some(race) = self.cut_pulse(start) {
-            return Err(Window::Race(race));
+            return Err(WindowOutcome::Race(race));
         }
         Ok(LocalStop {
             time: exposure.falling(edge) + ripple,
@@ -180,7 +180,7 @@ impl WindowLaw {
     }
 
     /// LOCAL_STOP of a counter that nothing resets.
-    pub(super) fn coming_round(&self, start: u16) -> Result<LocalStop, Window> {
+    pub(super) fn coming_round(&self, start: u16) -> Result<LocalStop, WindowOutcome> {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let counter = &timing.counter;
         let load_period = self.sensor.load_clock().period();
@@ -188,7 +188,7 @@ impl WindowLaw {
         let long_load = counter.load_pulse.filter(|&pulse| pulse >= half);
         let long_load = long_load.map(|pulse| Race::long_load(pulse, load_period));
         if let Some(race) = long_load.or_else(|| self.short_reset()) {
-            return Err(Window::Race(race));
+            return Err(WindowOutcome::Race(race));
         }
         let enabled = timing.stop_to_enabled;
         let first = exposure.rising_until(enabled) + 1;
@@ -202,14 +202,14 @@ impl WindowLaw {
             let what = Conflict::ClkAtEnable;
             let (phase, period) = (exposure.stop_phase, exposure.clock.period());
             let race = Race::with_stop(what, edge, in_doubt, phase, period);
-            return Err(Window::Race(race));
+            return Err(WindowOutcome::Race(race));
         }
         // A built-in counter without memory wraps.
-        let Some(rises) = Rises::of(&self.sensor, start) else {
-            return Err(Window::Never);
+        let Some(rises) = Rises::from_start_value(&self.sensor, start) else {
+            return Err(WindowOutcome::Never);
         };
         let Some(every) = rises.every else {
-            return Err(Window::Never);
+            return Err(WindowOutcome::Never);
         };
         let periods = exposure.stop_periods as i64;
         let last = periods * exposure.laser_cycles as i64;
@@ -217,9 +217,9 @@ impl WindowLaw {
         let is_first_count = rises.first == 0 && exposure.falling(first) <= enabled + ROUNDING;
         if is_first_count || (last >= edge && (last - edge) % every == 0) {
             let comes = exposure.falling(if is_first_count { first } else { last });
-            return Err(Window::Race(Race {
+            return Err(WindowOutcome::Race(Race {
                 what: Conflict::LocalStopAtEnable,
-                after: Origin::FirstStop,
+                after: RaceOrigin::FirstStop,
                 comes,
                 from: comes.min(enabled),
                 to: Some(comes.max(if is_first_count {
@@ -231,7 +231,7 @@ impl WindowLaw {
             }));
         }
         if edge > last {
-            return Err(Window::Never);
+            return Err(WindowOutcome::Never);
         }
         // STOP also resets HIT.
         let end = exposure.clock.periods(periods);
@@ -243,7 +243,7 @@ impl WindowLaw {
         };
         let mut edges = (edge..last).step_by(every as usize).take(periods as usize);
         if let Some(race) = edges.find_map(meets_reset) {
-            return Err(Window::Race(race));
+            return Err(WindowOutcome::Race(race));
         }
         Ok(LocalStop {
             time: exposure.falling(edge) + self.ripple(start),

@@ -12,7 +12,7 @@ fn law(config: &SensorConfig) -> WindowLaw {
 
 #[test]
 fn the_typical_ripple_is_the_published_one() {
-    let ripple = ChipTiming::of(&SensorConfig::default()).ripple();
+    let ripple = ChipTiming::new(&SensorConfig::default()).ripple();
     assert!((ripple.as_ns() - 1.2).abs() < 0.01, "{ripple}");
 }
 
@@ -32,8 +32,8 @@ fn a_start_value_beyond_the_laser_cycle_never_opens() {
     let config = SensorConfig::default();
     let short = WindowLaw::new(&config, &Exposure::new(&config, 100, 1));
     assert!(short.window(98).open().is_some());
-    assert_eq!(short.window(99), Window::Never);
-    assert_eq!(short.window(511), Window::Never);
+    assert_eq!(short.window(99), WindowOutcome::Never);
+    assert_eq!(short.window(511), WindowOutcome::Never);
     // The last one serves all that it collects, half a window beyond its centre too.
     let last = short.interval(&short.window(98).open().unwrap());
     assert_eq!(short.start_for(last.end - Time::from_fs(1)), Some(98));
@@ -73,7 +73,7 @@ fn the_edge_at_enable_may_race_from_a_rounding_before_it() {
     };
     let races = |off_fs: i64| {
         let window = with_edge_at(enabled + Time::from_fs(off_fs));
-        matches!(window, Window::Race(race) if race.what == Conflict::ClkAtEnable)
+        matches!(window, WindowOutcome::Race(race) if race.what == Conflict::ClkAtEnable)
     };
     let found: Vec<bool> = (-5..5).map(races).collect();
     let expected: Vec<bool> = (-5..5).map(|off_fs| off_fs >= -ROUNDING.as_fs()).collect();
@@ -194,7 +194,7 @@ proptest! {
         let window = |config: &SensorConfig| {
             WindowLaw::new(config, &Exposure::new(config, 1024, 1)).window(100)
         };
-        if let Window::Race(race) = window(&config) {
+        if let WindowOutcome::Race(race) = window(&config) {
             prop_assert!(race.slack() <= ROUNDING, "{race}");
             // A cure is no larger than it must be: 40 fs less of it, ten times the rounding of an edge, leaves a race.
             let less = Time::from_fs(40);
@@ -232,11 +232,11 @@ proptest! {
             }
             for config in not_cured {
                 let again = window(&config);
-                prop_assert!(matches!(again, Window::Race(_)), "{race}; less than {}: {again:?}", race.cure);
+                prop_assert!(matches!(again, WindowOutcome::Race(_)), "{race}; less than {}: {again:?}", race.cure);
             }
             for config in cured {
                 let again = window(&config);
-                let is_same = matches!(again, Window::Race(r) if r.what == race.what);
+                let is_same = matches!(again, WindowOutcome::Race(r) if r.what == race.what);
                 prop_assert!(!is_same, "{race}; {}: {again:?}", race.cure);
             }
         }
@@ -254,13 +254,13 @@ proptest! {
         };
         let window = |config: &SensorConfig| WindowLaw::new(config, &Exposure::new(config, 512, 1)).window(start);
         let fast = config(load_mhz * 1e6);
-        let pulse = ChipTiming::of(&fast).counter.load_pulse;
+        let pulse = ChipTiming::new(&fast).counter.load_pulse;
         let is_over = pulse.is_some_and(|pulse| pulse * 2 < fast.load_clock().period());
         match window(&fast) {
-            Window::Race(Race { what: Conflict::InitAtLoadPulse, cure: Cure::LoadPeriod(at_least), .. }) => {
+            WindowOutcome::Race(Race { what: Conflict::InitAtLoadPulse, cure: Cure::LoadPeriod(at_least), .. }) => {
                 prop_assert!(!is_over);
                 let cured = window(&config(1.0 / at_least.as_s()));
-                let is_same = matches!(cured, Window::Race(Race { what: Conflict::InitAtLoadPulse, .. }));
+                let is_same = matches!(cured, WindowOutcome::Race(Race { what: Conflict::InitAtLoadPulse, .. }));
                 prop_assert!(!is_same);
             }
             _ => prop_assert!(is_over),

@@ -89,7 +89,7 @@ impl Blindness {
 
     /// Probability of being able to fire in step `step` of the window, `age` ≥ 1 steps after the last avalanche.
     #[inline]
-    pub(super) fn able(&self, step: usize, age: usize) -> f64 {
+    pub(super) fn firing_probability(&self, step: usize, age: usize) -> f64 {
         match self.able.get(age - 1) {
             None => 1.0,
             Some(&able) if self.by_step.is_empty() => able,
@@ -97,7 +97,7 @@ impl Blindness {
         }
     }
 
-    /// How far [`Blindness::able`] may be from what it is in even light, `age` steps after, where photons come up to three
+    /// How far [`Blindness::firing_probability`] may be from what it is in even light, `age` steps after, where photons come up to three
     /// times as densely as on average in either step.
     pub(super) fn most_uneven(&self, age: usize) -> f64 {
         let able = self.able[age - 1];
@@ -107,7 +107,7 @@ impl Blindness {
     /// Probabilities that a photon, present with probability `p`, takes a SPAD of `age` back to age 0, and that it makes a pulse.
     #[inline(always)]
     pub(super) fn hit(&self, step: usize, age: usize, p: f64) -> (f64, f64) {
-        let pulses = p * self.able(step, age);
+        let pulses = p * self.firing_probability(step, age);
         match self.law {
             DeadTimeLaw::NonParalysable => (pulses, pulses),
             DeadTimeLaw::Paralysable => (p, pulses),
@@ -117,7 +117,7 @@ impl Blindness {
     /// The complement of the first of [`Blindness::hit`]; `q` is 1 − `p`.
     fn keeps(&self, step: usize, age: usize, p: f64, q: f64) -> f64 {
         match self.law {
-            DeadTimeLaw::NonParalysable => q + p * (1.0 - self.able(step, age)),
+            DeadTimeLaw::NonParalysable => q + p * (1.0 - self.firing_probability(step, age)),
             DeadTimeLaw::Paralysable => q,
         }
     }
@@ -171,7 +171,7 @@ impl Ages {
     }
 
     /// The probability `share` of an age, in one of those SPADs, the part `left`, that are of no age looked at before.
-    pub(super) fn among(share: f64, left: f64) -> f64 {
+    pub(super) fn conditional_share(share: f64, left: f64) -> f64 {
         if share > 0.0 {
             (share / left).min(1.0)
         } else {
@@ -226,7 +226,7 @@ impl Ages {
     pub(super) fn pulse(&self, blindness: &Blindness, step: usize, mean: f64) -> f64 {
         let aged = self.aged.iter().enumerate();
         let able: f64 = aged
-            .map(|(index, age)| age * blindness.able(step, index + 1))
+            .map(|(index, age)| age * blindness.firing_probability(step, index + 1))
             .sum();
         absorbed(mean) * (self.free + able)
     }
@@ -243,7 +243,9 @@ mod tests {
     fn blindness_adds_up_to_the_dead_time_less_half_a_step() {
         for steps in [1.0, 1.3, 3.072, 7.999, 40.5] {
             let blindness = Blindness::new(DeadTimeLaw::NonParalysable, steps);
-            let sum: f64 = (1..100).map(|age| 1.0 - blindness.able(0, age)).sum();
+            let sum: f64 = (1..100)
+                .map(|age| 1.0 - blindness.firing_probability(0, age))
+                .sum();
             assert!((sum - (steps - 0.5)).abs() < 1e-12, "{steps}: {sum}");
         }
     }

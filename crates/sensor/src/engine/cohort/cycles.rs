@@ -8,7 +8,7 @@
 //! Early ones may remember the first STOP edge, or lack an echo that a cycle before the exposure would have sent; late
 //! ones lack that of a cycle after it. All others are alike, unless a SPAD stays busy from one window to the next:
 //! without a dead time's length free of photons it cannot be told whether it has recovered. The probability of that
-//! is bounded by going back from a window, dead time by dead time ([`Scene::busy_back_to`]).
+//! is bounded by going back from a window, dead time by dead time ([`CohortLight::busy_back_to`]).
 
 use smallvec::SmallVec;
 
@@ -39,7 +39,7 @@ pub(super) struct LikeCycles {
 #[cfg(test)]
 impl LikeCycles {
     /// Cycles in whose bins there are `means` photons on a SPAD, after much light of `before` photons in each step.
-    pub(super) fn of(cycles: u64, blindness: Blindness, before: f64, means: &[f64]) -> Self {
+    pub(super) fn steady(cycles: u64, blindness: Blindness, before: f64, means: &[f64]) -> Self {
         LikeCycles {
             cycles,
             ages: Ages::steady(&blindness, before),
@@ -51,7 +51,7 @@ impl LikeCycles {
 }
 
 /// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.
-pub(super) struct Scene {
+pub(super) struct CohortLight {
     pub light: SpadLight,
     pub dead_fs: f64,
     /// How long after a dead time its avalanche may have caused another one.
@@ -85,7 +85,7 @@ struct Back {
 
 /// How a settled laser cycle's neighbours begin.
 #[derive(Debug, Clone)]
-pub(super) enum Before {
+pub(super) enum NeighbourStart {
     /// Dark until then: every SPAD is ready.
     Dark(f64),
     /// Background for ever, and from then on all the light there is. What is forgotten by the window may have been another.
@@ -96,11 +96,11 @@ pub(super) enum Before {
 pub(super) struct Class {
     pub cycles: u64,
     pub extent: Extent,
-    pub before: Before,
+    pub before: NeighbourStart,
     pub not_compared: usize,
 }
 
-impl Scene {
+impl CohortLight {
     /// Lengths of a dead time, of what an avalanche may cause after it, and of a CLK period, the start of the window and the length of a laser cycle, fs.
     pub(super) fn new(
         light: SpadLight,
@@ -109,7 +109,7 @@ impl Scene {
         bins: usize,
         edges_fs: Option<Vec<f64>>,
     ) -> Self {
-        Scene {
+        CohortLight {
             edges_fs,
             busy: absorbed(light.most_background(dead_fs)),
             light,
@@ -233,9 +233,9 @@ impl Scene {
                     echoes: sent,
                 },
                 before: if is_settled {
-                    Before::Steady(steady_until.max(since_fs))
+                    NeighbourStart::Steady(steady_until.max(since_fs))
                 } else {
-                    Before::Dark(starts_fs)
+                    NeighbourStart::Dark(starts_fs)
                 },
                 not_compared: law.not_compared(window, cycle),
             }
@@ -247,8 +247,8 @@ impl Scene {
     pub(super) fn start(&self, blindness: &Blindness, class: &Class) -> Ages {
         let step_fs = self.period_fs;
         let (mut ages, since_fs) = match class.before {
-            Before::Dark(until_fs) => (Ages::rested(blindness), until_fs),
-            Before::Steady(until_fs) => {
+            NeighbourStart::Dark(until_fs) => (Ages::rested(blindness), until_fs),
+            NeighbourStart::Steady(until_fs) => {
                 let background = self.light.background(step_fs);
                 (Ages::steady(blindness, background), until_fs)
             }
@@ -271,7 +271,7 @@ impl Scene {
         match &self.edges_fs {
             Some(edges_fs) => {
                 let edges_fs: Vec<f64> = edges_fs.iter().map(|edge| self.from_fs + edge).collect();
-                self.light.between(&edges_fs, extent).into()
+                self.light.mean_photons(&edges_fs, extent).into()
             }
             None => (self.light).steps(self.from_fs, self.period_fs, self.bins, extent),
         }

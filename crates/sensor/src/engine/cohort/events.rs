@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::cycles::Scene;
+use super::cycles::CohortLight;
 use crate::chip::{SensorConfig, Tdc, correlation};
 use crate::engine::{EngineError, NotModelled};
 use crate::units::Time;
@@ -13,7 +13,7 @@ pub(super) struct EventTable(pub(super) SmallVec<[bool; 17]>);
 
 impl EventTable {
     /// By TYPE and THRESHOLD, or, where delay lines time photons, an odd number: each SPAD turns the photon line over.
-    pub(super) fn of(sensor: &SensorConfig) -> Self {
+    pub(super) fn from_sensor(sensor: &SensorConfig) -> Self {
         Self::new(sensor.spads(), |fired| match sensor.tdc {
             Tdc::DelayLine => fired % 2 == 1,
             // With a counter TDC nothing is drawn.
@@ -94,7 +94,7 @@ const MEETINGS_THAT_DO_NOT_COUNT: f64 = 0.01;
 /// Where that may put the mean of a bin off by more than `error` of its counting noise: λ²·stage² of the laser
 /// cycles at either edge, with λ photons a second on all SPADs together and `stage`, the delay of an XOR, at most.
 pub(super) fn check_meetings(
-    scene: &Scene,
+    scene: &CohortLight,
     spads: usize,
     stage: Time,
     laser_cycles: u32,

@@ -29,11 +29,11 @@ use smallvec::{SmallVec, smallvec};
 
 use super::FEW_STEPS;
 use super::blindness::{Ages, Blindness};
-use super::cycles::{Before, Class, Scene};
+use super::cycles::{Class, CohortLight, NeighbourStart};
 use super::events::EventTable;
 use super::grid::{CELLS, Grid};
 use super::hits::Hits;
-use super::secondaries::{Acts, Cell, Secondaries};
+use super::secondaries::{Acts, HazardCell, Secondaries};
 use super::spad_light::absorbed;
 use crate::engine::EngineError;
 use crate::photon::DeadTimeLaw;
@@ -134,7 +134,7 @@ impl Fine {
 /// # Errors
 /// When the finest grid does not do.
 pub(super) fn solve(
-    scene: &Scene,
+    scene: &CohortLight,
     blindness: &Blindness,
     secondaries: Secondaries,
     class: &Class,
@@ -197,7 +197,7 @@ pub(super) fn event(is_event: &EventTable, pulse: f64) -> [f64; 2] {
 
 /// One SPAD, carried through the window.
 fn carry(
-    scene: &Scene,
+    scene: &CohortLight,
     blindness: &Blindness,
     secondaries: Secondaries,
     class: &Class,
@@ -206,8 +206,8 @@ fn carry(
     let memory = blindness.memory();
     let remembered_fs = memory as f64 * scene.period_fs;
     let (is_dark, since_fs) = match class.before {
-        Before::Dark(until_fs) => (true, scene.from_fs - until_fs),
-        Before::Steady(until_fs) => (false, scene.from_fs - until_fs),
+        NeighbourStart::Dark(until_fs) => (true, scene.from_fs - until_fs),
+        NeighbourStart::Steady(until_fs) => (false, scene.from_fs - until_fs),
     };
     let since_fs = match blindness.law {
         DeadTimeLaw::NonParalysable => since_fs.max(remembered_fs),
@@ -216,11 +216,11 @@ fn carry(
     };
     let grid = Grid::new(scene, class, since_fs, memory, halvings);
     let absolute: Vec<f64> = grid.edges.iter().map(|edge| scene.from_fs + edge).collect();
-    let cells: Vec<Cell> = scene
+    let cells: Vec<HazardCell> = scene
         .light
-        .between(&absolute, &class.extent)
+        .mean_photons(&absolute, &class.extent)
         .into_iter()
-        .map(Cell::new)
+        .map(HazardCell::new)
         .collect();
     let spad = Spad {
         grid,
@@ -243,7 +243,7 @@ fn carry(
 
 struct Spad {
     grid: Grid,
-    cells: Vec<Cell>,
+    cells: Vec<HazardCell>,
     memory: usize,
     secondaries: Secondaries,
 }
@@ -289,14 +289,20 @@ impl Spad {
         for (cell, light) in self.cells.iter().enumerate() {
             let before = acts[cell];
             let returning = [0, 1].map(|trap| before.pulses[trap] + before.silent[trap]);
-            let [ours, _] = light.take(ready[0] + ready[1], returning[0] + returning[1]);
+            let [ours, _] = light.hit_and_ready(ready[0] + ready[1], returning[0] + returning[1]);
             crossing.push(secondaries.crosstalk * ours);
             let width_fs = self.width_fs(cell);
-            acts.push(secondaries.act(light, crossing[cell], width_fs, &mut ready, returning));
+            acts.push(secondaries.advance_cell(
+                light,
+                crossing[cell],
+                width_fs,
+                &mut ready,
+                returning,
+            ));
         }
         let acts = &acts[back..];
         let in_period =
-            |number: usize| -> f64 { acts[self.period(number)].iter().map(Acts::seen).sum() };
+            |number: usize| -> f64 { acts[self.period(number)].iter().map(Acts::pulse_sum).sum() };
 
         let windows = memory..memory + self.bins();
         let mut fine = Fine {
@@ -325,9 +331,14 @@ impl Spad {
                         let returning = from.map_or([0.0; 2], |from| acts[from].pulses);
                         blind -= returning[0] + returning[1];
                         let (light, width_fs) = (&self.cells[cell], self.width_fs(cell));
-                        let act =
-                            secondaries.act(light, crossing[cell], width_fs, &mut ready, returning);
-                        fired += act.seen();
+                        let act = secondaries.advance_cell(
+                            light,
+                            crossing[cell],
+                            width_fs,
+                            &mut ready,
+                            returning,
+                        );
+                        fired += act.pulse_sum();
                         // Who is blinded without a pulse stays so for as long as that matters.
                         blind += act.silent[0] + act.silent[1];
                     }

@@ -2,7 +2,7 @@
 //! between, each repeated every dead time, so that what fires in a cell is ready again exactly in the cell as many
 //! further on.
 
-use super::cycles::{Class, Scene};
+use super::cycles::{Class, CohortLight};
 
 /// Cells of a CLK period on the coarsest grid, at least.
 pub(super) const CELLS: f64 = 4.0;
@@ -29,7 +29,7 @@ pub(super) struct Grid {
 impl Grid {
     /// From `since_fs` before the window on.
     pub(super) fn new(
-        scene: &Scene,
+        scene: &CohortLight,
         class: &Class,
         since_fs: f64,
         memory: usize,

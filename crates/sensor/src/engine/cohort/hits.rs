@@ -57,8 +57,11 @@ impl Hits {
         if cycles == 0 || least >= self.spads || self.at_least[least] == 0.0 {
             return 0;
         }
-        let of = self.at_least[least];
-        let (p, q) = (self.at_least[least + 1] / of, self.exactly[least] / of);
+        let hit_probability = self.at_least[least];
+        let (p, q) = (
+            self.at_least[least + 1] / hit_probability,
+            self.exactly[least] / hit_probability,
+        );
         binomial(cycles, p.min(1.0), q.min(1.0), random)
     }
 }

@@ -27,7 +27,11 @@ use crate::chip::MOST_SPADS;
 use crate::photon::DeadTimeLaw;
 
 /// Counts of every bin after these laser cycles.
-pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+pub(super) fn draw_counts(
+    like: &LikeCycles,
+    is_event: &EventTable,
+    random: &mut RandomWords,
+) -> Counts {
     let mut tree = Tree::new(&like.blindness, is_event.spads(), like.cycles);
     tree.age(&like.ages, random);
     like.means
@@ -177,12 +181,12 @@ impl<'a> Tree<'a> {
     fn age(&mut self, ages: &Ages, random: &mut RandomWords) {
         let mut younger: f64 = 1.0;
         for &share in ages.aged.iter().rev() {
-            let p = Ages::among(share, younger);
+            let p = Ages::conditional_share(share, younger);
             younger -= share;
             self.laws.forget();
             self.each_node(|tree, node| {
                 let group = tree.free(node, p, 1.0 - p, 0.0);
-                let taken = tree.take(node, &group, random);
+                let taken = tree.draw_cycles(node, &group, random);
                 tree.spread(node, taken, &[group], true, &Outcome::default(), random);
             });
             self.step += 1;
@@ -199,7 +203,7 @@ impl<'a> Tree<'a> {
                 groups.clear();
                 groups.push(tree.free(node, p, q, 1.0));
                 tree.add_aged(node, p, q, &mut groups);
-                let taken = tree.take(node, &groups[0], random);
+                let taken = tree.draw_cycles(node, &groups[0], random);
                 if taken > 0 {
                     tree.spread(node, taken, &groups, true, &Outcome::default(), random);
                 }
@@ -227,7 +231,7 @@ impl<'a> Tree<'a> {
     }
 
     /// Takes those cycles out of `node` in which something happens from group `first` on.
-    fn take(&mut self, node: u32, first: &Group, random: &mut RandomWords) -> u64 {
+    fn draw_cycles(&mut self, node: u32, first: &Group, random: &mut RandomWords) -> u64 {
         let node = &mut self.nodes[node as usize];
         let (any, none) = (first.any_from_here, first.none_from_here);
         let taken = binomial(node.cycles, any.min(1.0), none, random);
@@ -242,7 +246,7 @@ impl<'a> Tree<'a> {
             let Node { parent, oldest, .. } = self.nodes[at as usize];
             let age = (self.step - oldest.step) as usize;
             let step = self.step as usize - self.blindness.memory();
-            let able = self.blindness.able(step, age);
+            let able = self.blindness.firing_probability(step, age);
             let (class, p, q, able) = match self.blindness.law {
                 DeadTimeLaw::NonParalysable => (age, p * able, q + p * (1.0 - able), 1.0),
                 DeadTimeLaw::Paralysable => (FREE, p, q, able),

@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use smallvec::SmallVec;
 
 use super::cycles::LikeCycles;
-use super::{Cohort, Way};
+use super::{Cohort, StateMethod};
 use crate::engine::EngineError;
 use crate::photon::{PixelLight, StreamConfig};
 
@@ -24,18 +24,18 @@ const MOST_STARTS: usize = 8;
 const MOST_BYTES: usize = 64 << 20;
 
 /// Laser cycles alike, and how their events are drawn.
-pub(super) struct Ready {
+pub(super) struct LikeCyclesMethod {
     pub(super) like: LikeCycles,
-    pub(super) way: Way,
+    pub(super) way: StateMethod,
 }
 
 /// What a window's laser cycles are made of; `None` where it does not open.
-pub(super) type Prepared = Option<Vec<Ready>>;
+pub(super) type WindowCycles = Option<Vec<LikeCyclesMethod>>;
 
 struct Entry {
     start: u16,
     light: PixelLight,
-    prepared: Arc<Prepared>,
+    prepared: Arc<WindowCycles>,
 }
 
 /// What was prepared of each macropixel in exposures of one [`StreamConfig`] but for the seed.
@@ -73,7 +73,7 @@ impl KeptCohorts {
         pixel: u32,
         start: u16,
         light: &PixelLight,
-    ) -> Result<Arc<Prepared>, EngineError> {
+    ) -> Result<Arc<WindowCycles>, EngineError> {
         let of_pixel = &self.of_pixels[pixel as usize];
         let lock = || of_pixel.lock().unwrap_or_else(PoisonError::into_inner);
         let is_its = |entry: &&Entry| entry.start == start && entry.light == *light;
@@ -81,7 +81,7 @@ impl KeptCohorts {
             return Ok(Arc::clone(&entry.prepared));
         }
         let prepared = Arc::new(engine.prepared(&self.config, start, light)?);
-        let bytes = prepared.iter().flatten().map(Ready::bytes).sum();
+        let bytes = prepared.iter().flatten().map(LikeCyclesMethod::bytes).sum();
         let mut entries = lock();
         if entries.len() < MOST_STARTS
             && self.bytes.fetch_add(bytes, Ordering::Relaxed) < MOST_BYTES
@@ -96,12 +96,12 @@ impl KeptCohorts {
     }
 }
 
-impl Ready {
+impl LikeCyclesMethod {
     /// About as much memory as it takes.
     fn bytes(&self) -> usize {
         let of_way = match &self.way {
-            Way::Recent(histories) => histories.number() * size_of::<f64>(),
-            Way::Pooled | Way::Joint => 0,
+            StateMethod::Recent(histories) => histories.number() * size_of::<f64>(),
+            StateMethod::Pooled | StateMethod::Joint => 0,
         };
         size_of::<Self>() + of_way
     }

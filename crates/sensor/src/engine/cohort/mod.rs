@@ -71,11 +71,11 @@ use self::cycles::LikeCycles;
 pub use self::draw::none_of;
 use self::events::EventTable;
 pub use self::hits::at_least_hit;
-use self::kept::{KeptCohorts, Prepared, Ready};
+use self::kept::{KeptCohorts, LikeCyclesMethod, WindowCycles};
 use self::recent::Histories;
 pub use self::secondaries::variance_left_out;
 use self::words::RandomWords;
-use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work};
+use super::{Engine, EngineError, EngineWork, Expose, ExposureResult, LitPixel};
 use crate::chip::{Exposure, Sensor, WindowLaw, histogram, window_law};
 use crate::photon::{PhotonStream, PixelLight, StreamConfig};
 
@@ -104,7 +104,7 @@ pub struct Cohort {
 }
 
 /// How the state of laser cycles alike is kept.
-enum Way {
+enum StateMethod {
     Pooled,
     Recent(Histories),
     Joint,
@@ -113,7 +113,7 @@ enum Way {
 /// A start value's window, and the beginning of the photon times it collects, in femtoseconds after STOP.
 #[derive(Debug, Clone, Copy)]
 struct Opening {
-    window: window_law::Window,
+    window: window_law::WindowOutcome,
     from_fs: f64,
 }
 
@@ -126,7 +126,7 @@ impl Cohort {
     /// An engine for macropixels with a law of their own.
     pub fn with_law(law: WindowLaw, options: CohortOptions) -> Self {
         let sensor = law.sensor().clone();
-        let is_event = EventTable::of(&sensor);
+        let is_event = EventTable::from_sensor(&sensor);
         Cohort {
             law,
             windows: vec![OnceLock::new(); usize::from(sensor.largest_start()) + 1],
@@ -232,8 +232,8 @@ impl Cohort {
         stream: &StreamConfig,
         start: u16,
         light: &PixelLight,
-    ) -> Result<Prepared, EngineError> {
-        let ready = |like: LikeCycles| Ready {
+    ) -> Result<WindowCycles, EngineError> {
+        let ready = |like: LikeCycles| LikeCyclesMethod {
             way: self.way(&like),
             like,
         };
@@ -242,15 +242,15 @@ impl Cohort {
     }
 
     /// Draws the counts of a macropixel.
-    fn sums_of(&self, prepared: &Prepared, seed: u64, pixel: u32) -> Counts {
+    fn sums_of(&self, prepared: &WindowCycles, seed: u64, pixel: u32) -> Counts {
         let mut sums: Counts = smallvec![0; self.sensor.bins];
         let random = &mut RandomWords::new(seed, pixel);
         let is_event = &self.is_event;
-        for Ready { like, way } in prepared.iter().flatten() {
+        for LikeCyclesMethod { like, way } in prepared.iter().flatten() {
             let counts = match way {
-                Way::Pooled => pooled::run(like, is_event, random),
-                Way::Recent(histories) => histories.run(like.cycles, random),
-                Way::Joint => joint::run(like, is_event, random),
+                StateMethod::Pooled => pooled::draw_counts(like, is_event, random),
+                StateMethod::Recent(histories) => histories.draw_counts(like.cycles, random),
+                StateMethod::Joint => joint::draw_counts(like, is_event, random),
             };
             let compared = sums.iter_mut().zip(counts).skip(like.not_compared);
             compared.for_each(|(sum, count)| *sum += count);
@@ -259,16 +259,16 @@ impl Cohort {
     }
 
     /// The cheapest way that neglects no more than it may.
-    fn way(&self, like: &LikeCycles) -> Way {
+    fn way(&self, like: &LikeCycles) -> StateMethod {
         let photons = pooled::largest(&like.means);
         let spads = self.is_event.spads() as u64 * like.cycles;
         if photons <= self.most_photons
             && pooled::looked_at(&like.blindness, photons, spads) <= WORTH_LOOKING_AT
         {
-            return Way::Pooled;
+            return StateMethod::Pooled;
         }
         recent::histories(like, &self.is_event, self.options.neglect)
-            .map_or(Way::Joint, Way::Recent)
+            .map_or(StateMethod::Joint, StateMethod::Recent)
     }
 
     /// Cohorts that [`Cohort::draw`] follows, summed over the steps of the window: what its time goes with, estimated.
@@ -281,13 +281,13 @@ impl Cohort {
         start: u16,
         light: &PixelLight,
     ) -> Result<f64, EngineError> {
-        let of = |like: LikeCycles| match self.way(&like) {
-            Way::Pooled => like.means.len() as f64,
-            Way::Recent(histories) => of_histories(histories.number()),
-            Way::Joint => of_joint_states(&like, self.is_event.spads()),
+        let steps = |like: LikeCycles| match self.way(&like) {
+            StateMethod::Pooled => like.means.len() as f64,
+            StateMethod::Recent(histories) => of_histories(histories.number()),
+            StateMethod::Joint => of_joint_states(&like, self.is_event.spads()),
         };
         let cohorts = self.cohorts(stream, start, light)?.unwrap_or_default();
-        Ok(cohorts.into_iter().map(of).sum())
+        Ok(cohorts.into_iter().map(steps).sum())
     }
 
     /// Mean of every bin of [`Cohort::hits`], computed.
@@ -326,10 +326,14 @@ impl Engine for Cohort {
 }
 
 impl Expose for Cohort {
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError> {
         let dark = PixelLight::dark();
         let config = stream.config();
-        let mut exposed = Exposed::new(self.sensor.bins);
+        let mut exposed = ExposureResult::new(self.sensor.bins);
         let begun = || KeptCohorts::new(config, self.sensor.pixels());
         let kept = self.kept.as_ref().map(|kept| kept.get_or_init(begun));
         let kept = kept.filter(|kept| kept.is_of(config));
@@ -351,12 +355,12 @@ impl Expose for Cohort {
             exposed.histograms.push(&counts);
             let closed = self.opening(pixel.start).window.open().is_none();
             let periods = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
-            exposed.work += Work {
+            exposed.work += EngineWork {
                 macropixels: 1,
                 skipped_closed: u64::from(closed),
                 clk_periods: periods,
                 clk_periods_visited: if closed { 0 } else { self.sensor.bins as u64 },
-                ..Work::default()
+                ..EngineWork::default()
             };
         }
         Ok(exposed)

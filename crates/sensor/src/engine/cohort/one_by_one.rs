@@ -8,7 +8,11 @@ use super::words::RandomWords;
 use crate::photon::DeadTimeLaw;
 
 /// Events of every bin of one of these laser cycles.
-pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+pub(super) fn draw_counts(
+    like: &LikeCycles,
+    is_event: &EventTable,
+    random: &mut RandomWords,
+) -> Counts {
     let blindness = &like.blindness;
     // The step of each SPAD's last avalanche, counted from the window's first.
     let fired_before = |random: &mut RandomWords| {
@@ -30,7 +34,7 @@ pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomW
                 continue;
             }
             let able = fired.map_or(1.0, |before| {
-                blindness.able(step as usize, (step - before) as usize)
+                blindness.firing_probability(step as usize, (step - before) as usize)
             });
             let makes_pulse = random.uniform() < able;
             pulses += usize::from(makes_pulse);
@@ -58,13 +62,13 @@ mod tests {
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
             for least in [1, 2] {
                 let blindness = Blindness::new(law, 1.6);
-                let like = LikeCycles::of(1, blindness, 0.1, &means);
+                let like = LikeCycles::steady(1, blindness, 0.1, &means);
                 let is_event = EventTable::new(16, |spads| spads >= least);
                 let mut random = RandomWords::new(5, 0);
                 let mut both = [[[0u32; BINS]; BINS]; 2];
                 for _ in 0..TRIALS {
-                    let reference = run(&like, &is_event, &mut random);
-                    let tree = joint::run(&like, &is_event, &mut random);
+                    let reference = draw_counts(&like, &is_event, &mut random);
+                    let tree = joint::draw_counts(&like, &is_event, &mut random);
                     for (both, counts) in both.iter_mut().zip([reference, tree]) {
                         for (a, both) in both.iter_mut().enumerate() {
                             for (b, both) in both.iter_mut().enumerate() {

@@ -35,7 +35,7 @@ impl Overlap {
     /// Takes the marked ones among `candidates` draws out of their groups. Entry i of `marked` counts those of the
     /// groups 0 to i; entries after the last group repeat its count.
     #[inline(always)]
-    pub(super) fn meet(
+    pub(super) fn draw_marked(
         &self,
         candidates: u64,
         marked: &mut [[f64; VECTOR]],
@@ -73,7 +73,7 @@ impl Overlap {
 fn some_of(n: u64, count: u64, random: &mut RandomWords) -> Vec<u64> {
     let mut some: Vec<u64> = Vec::with_capacity(count as usize);
     while (some.len() as u64) < count {
-        let one = random.below(n);
+        let one = random.whole_below(n);
         if let Err(place) = some.binary_search(&one) {
             some.insert(place, one);
         }
@@ -100,12 +100,17 @@ mod tests {
             let trials = 50_000;
             let mut seen = vec![0u32; draws.min(marked) as usize + 1];
             let mut in_first = 0.0;
-            let of = Overlap::new(total, draws, bound);
+            let overlap = Overlap::new(total, draws, bound);
             for _ in 0..trials {
-                let candidates = binomial(draws, of.candidate, 1.0 - of.candidate, &mut random);
+                let candidates = binomial(
+                    draws,
+                    overlap.candidate,
+                    1.0 - overlap.candidate,
+                    &mut random,
+                );
                 let half = (marked / 2) as f64;
                 let mut groups = [[half, marked as f64, marked as f64, marked as f64]];
-                of.meet(candidates, &mut groups, &mut random);
+                overlap.draw_marked(candidates, &mut groups, &mut random);
                 let [[first, all, ..]] = groups;
                 let met = marked - all as u64;
                 in_first += half - first;
@@ -142,7 +147,7 @@ mod tests {
                 let error = 5.0 * (expected + 1.0).sqrt();
                 assert!(
                     (f64::from(count) - expected).abs() < error,
-                    "{of:?}, {marked}, {k}: {count} {expected}"
+                    "{overlap:?}, {marked}, {k}: {count} {expected}"
                 );
             }
         }

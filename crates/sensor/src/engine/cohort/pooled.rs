@@ -41,13 +41,13 @@ pub(super) fn largest(means: &Means) -> f64 {
     means.iter().copied().fold(0.0, f64::max)
 }
 
-/// Most photons on a SPAD in a CLK period with which [`run`] leaves out no larger correlations between two bins than this
+/// Most photons on a SPAD in a CLK period with which [`draw_counts`] leaves out no larger correlations between two bins than this
 /// `neglect`: ρ for it is eᵐ − 1 with m photons.
 pub(super) fn most_photons(neglect: f64) -> f64 {
     libm::log1p(neglect.sqrt())
 }
 
-/// Mean number of SPADs in a period that [`run`] has to follow one by one, of `spads` in all laser cycles, with `photons` on a SPAD
+/// Mean number of SPADs in a period that [`draw_counts`] has to follow one by one, of `spads` in all laser cycles, with `photons` on a SPAD
 /// in it at most.
 pub(super) fn looked_at(blindness: &Blindness, photons: f64, spads: u64) -> f64 {
     spads as f64 * blindness.memory() as f64 * photons * photons
@@ -55,7 +55,11 @@ pub(super) fn looked_at(blindness: &Blindness, photons: f64, spads: u64) -> f64 
 
 /// Counts of every bin after these laser cycles.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+pub(crate) fn draw_counts(
+    like: &LikeCycles,
+    is_event: &EventTable,
+    random: &mut RandomWords,
+) -> Counts {
     let odds = odds(&like.means);
     let cycles = like.cycles;
     let spads = is_event.spads() as u64 * cycles;
@@ -81,7 +85,7 @@ fn follow<const MOST: usize>(
 ) -> Counts {
     let mut counts = Counts::new();
     for odds in odds.chunks(LANES) {
-        let mut seen = see::<MOST>(odds, spads, cycles, random);
+        let mut seen = draw_hits::<MOST>(odds, spads, cycles, random);
         let sums = seen.hits();
         let (overlaps, candidates) = pool.candidates(&sums, random);
         for lane in 0..odds.len() {
@@ -113,13 +117,13 @@ fn odds(means: &Means) -> Means {
     photons
 }
 
-/// Rows of [`Seen`] that need no memory of their own.
+/// Rows of [`HitCycles`] that need no memory of their own.
 const FEW_ROWS: usize = 5;
 
 /// Cycles in which 0, 1, 2, … SPADs are hit at least, for each of several CLK periods, down to the first row of zeros.
-struct Seen(SmallVec<[[u64; LANES]; FEW_ROWS]>);
+struct HitCycles(SmallVec<[[u64; LANES]; FEW_ROWS]>);
 
-impl Seen {
+impl HitCycles {
     /// SPADs that are hit.
     #[inline(always)]
     fn hits(&self) -> [u64; LANES] {
@@ -151,12 +155,12 @@ impl Seen {
 /// With o = p/(1 − p), of cycles in which k or more of n SPADs are hit it is k with probability 1/tₖ, where
 /// tₖ = 1 + (n − k)/(k + 1) · o · tₖ₊₁ and tₙ = 1: every term is positive, so no digits are lost.
 #[inline(always)]
-fn see<const MOST: usize>(
+fn draw_hits<const MOST: usize>(
     odds_of_periods: &[f64],
     spads: usize,
     cycles: u64,
     random: &mut RandomWords,
-) -> Seen {
+) -> HitCycles {
     let mut odds = [0.0; LANES];
     odds[..odds_of_periods.len()].copy_from_slice(odds_of_periods);
     // tₖ − 1
@@ -187,7 +191,7 @@ fn see<const MOST: usize>(
     seen.push(at_least);
     // There always is a row of two SPADs.
     seen.resize(seen.len().max(3), [0; LANES]);
-    Seen(seen)
+    HitCycles(seen)
 }
 
 /// Takes `count` of the `hits` SPADs with a pulse in the period of this lane off the cycles they fell into.
@@ -245,7 +249,7 @@ const FEW: usize = 2 * LANES;
 fn fired_before(ages: &Ages, spads: u64, random: &mut RandomWords) -> SmallVec<[u64; FEW]> {
     let (mut left, mut share_left) = (spads, 1.0);
     let aged = ages.aged.iter().map(|&share| {
-        let p = Ages::among(share, share_left);
+        let p = Ages::conditional_share(share, share_left);
         let count = binomial(left, p, 1.0 - p, random);
         left -= count;
         share_left -= share;
@@ -328,11 +332,11 @@ impl<'a> Pool<'a> {
         let (mut few, mut many): ([_; 1], SmallVec<[[f64; VECTOR]; 4]>);
         let missed = if groups <= VECTOR {
             few = [[0.0; VECTOR]];
-            self.meet(overlap, candidates, &mut few, random);
+            self.draw_missed(overlap, candidates, &mut few, random);
             few.as_flattened()
         } else {
             many = smallvec![[0.0; VECTOR]; groups.div_ceil(VECTOR)];
-            self.meet(overlap, candidates, &mut many, random);
+            self.draw_missed(overlap, candidates, &mut many, random);
             many.as_flattened()
         };
         let mut without_pulse = self.idle - count(missed[0]);
@@ -343,7 +347,7 @@ impl<'a> Pool<'a> {
             let met = *fired - count(missed[1] - missed[0]);
             others -= met;
             for _ in 0..met {
-                let able = blindness.able(first, memory - step);
+                let able = blindness.firing_probability(first, memory - step);
                 let pulses = able > 0.0 && random.coarse() < able;
                 if pulses || blindness.law == DeadTimeLaw::Paralysable {
                     renewed[0] += 1;
@@ -362,7 +366,7 @@ impl<'a> Pool<'a> {
     /// Sets `missed` to how many SPADs are not met in this period: first the surely blind ones, then those and the oldest
     /// of the others, and so on to the youngest.
     #[inline(always)]
-    fn meet(
+    fn draw_missed(
         &self,
         overlap: &Overlap,
         candidates: u64,
@@ -376,6 +380,6 @@ impl<'a> Pool<'a> {
             *group = real(up_to);
             up_to += fired.next().unwrap_or(&0);
         }
-        overlap.meet(candidates, missed, random);
+        overlap.draw_marked(candidates, missed, random);
     }
 }

@@ -11,7 +11,7 @@
 use smallvec::SmallVec;
 
 use super::blindness::Blindness;
-use super::cycles::{self, Class, LikeCycles, Scene};
+use super::cycles::{self, Class, CohortLight, LikeCycles};
 use super::secondaries::Secondaries;
 use super::spad_light::SpadLight;
 use super::{Cohort, FEW_STEPS, Means, Opening, events, fine};
@@ -54,7 +54,7 @@ impl Cohort {
         }
         let [dead_fs, pending_fs] =
             [spads.dead_time, spads.reach()].map(|time| time.as_fs() as f64);
-        let scene = Scene::new(
+        let scene = CohortLight::new(
             SpadLight::new(stream, light),
             [dead_fs, pending_fs, shortest_fs],
             [from_fs, stream.cycle_s() * 1e15],
@@ -122,7 +122,7 @@ impl Cohort {
     /// The state, light and dead time of a class of laser cycles, as finely as they have to be known.
     fn like_cycles(
         &self,
-        scene: &Scene,
+        scene: &CohortLight,
         spads: &SpadModel,
         class: &Class,
     ) -> Result<LikeCycles, EngineError> {
@@ -142,7 +142,7 @@ impl Cohort {
             let ages = scene.start(&blindness, class);
             (blindness, ages)
         } else {
-            let secondaries = Secondaries::of(spads);
+            let secondaries = Secondaries::new(spads);
             let (is_event, error) = (&self.is_event, self.options.error);
             let fine = fine::solve(scene, &blindness, secondaries, class, is_event, error)?;
             means = fine.photons;
@@ -164,7 +164,7 @@ impl Cohort {
     /// them, may be wrong altogether.
     fn is_even_enough(
         &self,
-        scene: &Scene,
+        scene: &CohortLight,
         blindness: &Blindness,
         class: &Class,
         means: &Means,

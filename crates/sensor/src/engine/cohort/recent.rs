@@ -29,7 +29,7 @@ use super::abreast::{LANES, Lanes, binomials};
 use super::cycles::LikeCycles;
 use super::draw::binomial;
 use super::events::{EventTable, NoEvent};
-use super::weighted::Weighted;
+use super::weighted::WeightedSpad;
 use super::words::RandomWords;
 
 /// Bins that a history may tell of; of the fewest, all histories go abreast.
@@ -65,13 +65,13 @@ pub(crate) fn histories(
     let spads = (no_event.weight, is_event.spads());
     let rows = means.len().div_ceil(LANES);
     let pairs = Pairs::new(
-        Weighted::new(blindness, ages, spads, rows),
+        WeightedSpad::new(blindness, ages, spads, rows),
         &no_event,
         means,
     );
     for known in KNOWN {
         let rows = (1 << known) / LANES;
-        let spads = Weighted::new(blindness, ages, spads, rows);
+        let spads = WeightedSpad::new(blindness, ages, spads, rows);
         let (histories, without) = Histories::new(spads, &no_event, known, means);
         if pairs.left_out_by(&histories, &without, neglect) <= neglect {
             return Some(histories);
@@ -111,7 +111,7 @@ impl Histories {
     /// without an event; both by bin and history.
     #[inline(always)]
     fn new(
-        mut spads: Weighted,
+        mut spads: WeightedSpad,
         no_event: &NoEvent,
         known: u32,
         means: &[f64],
@@ -175,13 +175,13 @@ impl Histories {
     }
 
     /// Counts of every bin after `cycles` laser cycles.
-    pub(super) fn run(&self, cycles: u64, random: &mut RandomWords) -> Counts {
-        run(self, cycles, random)
+    pub(super) fn draw_counts(&self, cycles: u64, random: &mut RandomWords) -> Counts {
+        draw_counts(self, cycles, random)
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn run(histories: &Histories, cycles: u64, random: &mut RandomWords) -> Counts {
+fn draw_counts(histories: &Histories, cycles: u64, random: &mut RandomWords) -> Counts {
     let rows = histories.rows();
     let mut present = vec![[0; LANES]; rows];
     present[rows - 1][LANES - 1] = cycles;
@@ -241,7 +241,7 @@ struct Pairs {
 impl Pairs {
     /// With `means` photons on a SPAD; `spads` are under a weighting for every bin.
     #[inline(always)]
-    fn new(mut spads: Weighted, no_event: &NoEvent, means: &[f64]) -> Self {
+    fn new(mut spads: WeightedSpad, no_event: &NoEvent, means: &[f64]) -> Self {
         let bins = means.len();
         let rows = bins.div_ceil(LANES);
         let mut single = Vec::with_capacity(bins);
@@ -358,18 +358,18 @@ mod tests {
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
             for is_event in events() {
                 let blindness = Blindness::new(law, 2.6);
-                let like = LikeCycles::of(1, blindness, 0.1, &light());
+                let like = LikeCycles::steady(1, blindness, 0.1, &light());
                 let no_event = is_event.no_event().unwrap();
                 let spads = (no_event.weight, is_event.spads());
-                let spads = Weighted::new(&like.blindness, &like.ages, spads, 1);
+                let spads = WeightedSpad::new(&like.blindness, &like.ages, spads, 1);
                 let (histories, _) = Histories::new(spads, &no_event, 4, &like.means);
                 let mut random = RandomWords::new(6, 0);
                 let mut seen = [vec![[0u32; 32]; BINS - 4], vec![[0u32; 32]; BINS - 4]];
                 for _ in 0..TRIALS {
-                    let reference = one_by_one::run(&like, &is_event, &mut random);
+                    let reference = one_by_one::draw_counts(&like, &is_event, &mut random);
                     for (seen, counts) in seen
                         .iter_mut()
-                        .zip([reference, histories.run(1, &mut random)])
+                        .zip([reference, histories.draw_counts(1, &mut random)])
                     {
                         for (seen, bins) in seen.iter_mut().zip(counts.windows(5)) {
                             let word = bins.iter().fold(0, |word, &bin| word << 1 | bin as usize);
@@ -427,13 +427,14 @@ mod tests {
             let ages = Ages::steady(&blindness, 0.1);
             let means = light();
             let no_event = is_event.no_event().unwrap();
-            let of = |rows| {
+            let weighted = |rows| {
                 let spads = (no_event.weight, is_event.spads());
-                Weighted::new(&blindness, &ages, spads, rows)
+                WeightedSpad::new(&blindness, &ages, spads, rows)
             };
-            let pairs = Pairs::new(of(1), &no_event, &means);
-            let [few, some, all] = KNOWN
-                .map(|known| Histories::new(of((1 << known) / LANES), &no_event, known, &means));
+            let pairs = Pairs::new(weighted(1), &no_event, &means);
+            let [few, some, all] = KNOWN.map(|known| {
+                Histories::new(weighted((1 << known) / LANES), &no_event, known, &means)
+            });
             assert_eq!(pairs.left_out_by(&all.0, &all.1, 1.0), 0.0);
             let exact = correlations(&all.0);
             for (histories, without) in [&few, &some] {
@@ -461,7 +462,7 @@ mod tests {
         let found = |neglect, mean: f64, is_event: &EventTable| {
             let blindness = Blindness::new(DeadTimeLaw::NonParalysable, 3.07);
             let means: Means = light().iter().map(|light| light * mean).collect();
-            let like = LikeCycles::of(1, blindness, 0.01, &means);
+            let like = LikeCycles::steady(1, blindness, 0.01, &means);
             histories(&like, is_event, neglect).map(|found| found.known)
         };
         assert_eq!(found(1e-4, 0.02, &is_event), Some(4));

@@ -24,7 +24,7 @@ pub fn variance_left_out(afterpulse_probability: f64) -> f64 {
 
 /// What a hazard in a cell does.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cell {
+pub(super) struct HazardCell {
     pub mean: f64,
     /// Probability of nothing.
     pub none: f64,
@@ -36,7 +36,7 @@ pub(super) struct Cell {
     fire: f64,
 }
 
-impl Cell {
+impl HazardCell {
     pub(super) fn new(mean: f64) -> Self {
         let any = absorbed(mean);
         // Where the quotient would lose its digits, a series.
@@ -45,7 +45,7 @@ impl Cell {
         } else {
             1.0 - any / mean
         };
-        Cell {
+        HazardCell {
             mean,
             none: 1.0 - any,
             any,
@@ -57,14 +57,14 @@ impl Cell {
     /// As many more, for a reason of its own.
     fn and(self, more: f64) -> Self {
         if more > 0.0 {
-            Cell::new(self.mean + more)
+            HazardCell::new(self.mean + more)
         } else {
             self
         }
     }
 
     /// Those of `ready` SPADs and of `returning` ones to which something happens, and those that are ready afterwards.
-    pub(super) fn take(&self, ready: f64, returning: f64) -> [f64; 2] {
+    pub(super) fn hit_and_ready(&self, ready: f64, returning: f64) -> [f64; 2] {
         let taken = ready * self.any + returning * self.fire;
         [taken, ready * self.none + returning * self.stay]
     }
@@ -87,7 +87,7 @@ pub(super) struct Secondaries {
 }
 
 impl Secondaries {
-    pub(super) fn of(spads: &SpadModel) -> Self {
+    pub(super) fn new(spads: &SpadModel) -> Self {
         let time_fs = spads.afterpulse_time.as_fs() as f64;
         let afterpulses = spads.afterpulse_probability > 0.0;
         // Of four neighbours that each SPAD would have without the edge of the macropixel: 3 of 4 in 4×4.
@@ -113,9 +113,9 @@ impl Secondaries {
     /// What `ready` SPADs and those `returning` do in a cell, with its photons on each SPAD and `crossing` avalanches
     /// that come from others: what is ready afterwards, the pulses, by whether a carrier stays trapped, and
     /// avalanches that are no pulse of their own.
-    pub(super) fn act(
+    pub(super) fn advance_cell(
         &self,
-        photons: &Cell,
+        photons: &HazardCell,
         crossing: f64,
         width_fs: f64,
         ready: &mut Traps,
@@ -123,7 +123,7 @@ impl Secondaries {
     ) -> Acts {
         let mut acts = Acts::default();
         if self.are_none() {
-            [acts.pulses[0], ready[0]] = photons.take(ready[0], returning[0]);
+            [acts.pulses[0], ready[0]] = photons.hit_and_ready(ready[0], returning[0]);
             return acts;
         }
         let total = photons.and(crossing);
@@ -133,7 +133,7 @@ impl Secondaries {
                 continue;
             }
             let hazard = &hazards[trap];
-            let [taken, left] = hazard.take(ready[trap], returning[trap]);
+            let [taken, left] = hazard.hit_and_ready(ready[trap], returning[trap]);
             ready[trap] = left;
             if taken == 0.0 {
                 continue;
@@ -197,7 +197,7 @@ impl Acts {
         }
     }
 
-    pub(super) fn seen(&self) -> f64 {
+    pub(super) fn pulse_sum(&self) -> f64 {
         self.pulses[0] + self.pulses[1]
     }
 }

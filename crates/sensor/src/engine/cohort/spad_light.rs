@@ -176,12 +176,12 @@ impl SpadLight {
 
     /// Most background photons that `duration_fs` have on average.
     pub(super) fn most_background(&self, duration_fs: f64) -> f64 {
-        let of = |segment: &SpadSegment| {
+        let background = |segment: &SpadSegment| {
             let profile = segment.profile.as_ref();
             let greatest_hz = profile.map_or(0.0, |profile| profile.greatest_hz);
             segment.background_per_fs + greatest_hz * 1e-15 / self.spads
         };
-        self.segments.iter().map(of).fold(0.0, f64::max) * duration_fs
+        self.segments.iter().map(background).fold(0.0, f64::max) * duration_fs
     }
 
     /// An upper bound on the mean photons in a stretch that begins at `from_fs` of any laser cycle: what all laser
@@ -330,7 +330,7 @@ impl SpadLight {
     }
 
     /// Mean photons between successive `edges`.
-    pub(super) fn between(&self, edges: &[f64], extent: &Extent) -> Vec<f64> {
+    pub(super) fn mean_photons(&self, edges: &[f64], extent: &Extent) -> Vec<f64> {
         let lit = |edge: f64| edge.clamp(extent.lit_fs.start, extent.lit_fs.end);
         let stretches = edges.windows(2);
         let mut means: Vec<f64> = stretches
@@ -443,7 +443,7 @@ mod tests {
             let edges: Vec<f64> = (0..10).map(|i| from_fs + step_fs * f64::from(i)).collect();
             let law = spad.segments[0].echoes[0].law;
             let steps = spad.steps(from_fs, step_fs, 9, &extent);
-            let between = spad.between(&edges, &extent);
+            let between = spad.mean_photons(&edges, &extent);
             for (i, (a, b)) in steps.iter().zip(between).enumerate() {
                 let share = law.share(cycle, CYCLES, edges[i], edges[i + 1]);
                 prop_assert!((a - share).abs() < 1e-10 && (b - share).abs() < 1e-10, "{i}: {a} {b} {share}");

@@ -9,7 +9,7 @@ use super::blindness::{Ages, Blindness};
 use super::spad_light::absorbed;
 
 /// One SPAD under rows of weightings.
-pub(super) struct Weighted<'a> {
+pub(super) struct WeightedSpad<'a> {
     blindness: &'a Blindness,
     weight: f64,
     spads: usize,
@@ -22,7 +22,7 @@ pub(super) struct Weighted<'a> {
     total_named: Vec<Lanes>,
 }
 
-impl<'a> Weighted<'a> {
+impl<'a> WeightedSpad<'a> {
     /// A SPAD that begins in the state `ages`, one of `spads`, with `rows` rows of weightings by `weight`, still
     /// empty.
     #[inline(always)]
@@ -35,7 +35,7 @@ impl<'a> Weighted<'a> {
         debug_assert!(!ages.aged.is_empty(), "a pulse blinds for some time");
         let shares = ages.aged.iter().chain([&ages.free]);
         let ages = shares.map(|&share| vec![[share; LANES]; rows]).collect();
-        Weighted {
+        WeightedSpad {
             blindness,
             weight,
             spads,

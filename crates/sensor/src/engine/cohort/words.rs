@@ -1,6 +1,6 @@
 //! Random words for the cohorts' draws.
 
-use crate::photon::{Purpose, philox, philox_key};
+use crate::photon::{RandomPurpose, philox, philox_key};
 
 /// Random words, made many at a time: a pure function of seed and macropixel.
 pub(super) struct RandomWords {
@@ -28,7 +28,7 @@ impl RandomWords {
 
     /// The next `N` ≤ [`READY`] words.
     #[inline(always)]
-    fn take<const N: usize>(&mut self) -> [u32; N] {
+    fn next_words<const N: usize>(&mut self) -> [u32; N] {
         let mut words = [0; N];
         let ready = &self.words.as_flattened()[self.taken..];
         match ready.first_chunk() {
@@ -49,7 +49,7 @@ impl RandomWords {
 
     #[cold]
     fn refill(&mut self) {
-        let others = [0, self.pixel, Purpose::Cohort as u32];
+        let others = [0, self.pixel, RandomPurpose::Cohort as u32];
         philox::blocks_from(self.next_block, others, self.key, &mut self.words);
         self.next_block += READY as u32 / 4;
     }
@@ -57,13 +57,13 @@ impl RandomWords {
     /// A number in [0, 1) with 52 random bits.
     #[inline(always)]
     pub(super) fn uniform(&mut self) -> f64 {
-        unit(self.take())
+        unit(self.next_words())
     }
 
     /// As many numbers in [0, 1), with 52 random bits each.
     #[inline(always)]
     pub(super) fn uniforms<const N: usize>(&mut self) -> [f64; N] {
-        let (low, high) = (self.take::<N>(), self.take::<N>());
+        let (low, high) = (self.next_words::<N>(), self.next_words::<N>());
         std::array::from_fn(|i| unit([low[i], high[i]]))
     }
 
@@ -77,14 +77,14 @@ impl RandomWords {
     /// As many of these.
     #[inline(always)]
     pub(super) fn coarses<const N: usize>(&mut self) -> [f64; N] {
-        self.take::<N>()
+        self.next_words::<N>()
             .map(|word| f64::from(word) * (0.5f64).powi(32))
     }
 
     /// A whole number below `n` > 0; uneven by less than n/2⁶⁴.
     #[inline(always)]
-    pub(super) fn below(&mut self, n: u64) -> u64 {
-        let [high, low] = self.take().map(u128::from);
+    pub(super) fn whole_below(&mut self, n: u64) -> u64 {
+        let [high, low] = self.next_words().map(u128::from);
         (((high << 32 | low) * u128::from(n)) >> 64) as u64
     }
 }

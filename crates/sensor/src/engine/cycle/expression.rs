@@ -17,7 +17,7 @@
 use std::collections::HashMap;
 
 use super::survey::{Class, Survey};
-use super::unlevelled::Unlevelled;
+use super::unlevelled::LevelisationError;
 use crate::netlist::{CellKind, NetId};
 
 /// An expression, `delay` periods late, perhaps inverted.
@@ -168,7 +168,7 @@ impl<'s> Expressions<'s> {
     ///
     /// # Errors
     /// When its registers start with values that it cannot have.
-    pub(super) fn of_net(&mut self, net: NetId) -> Result<Literal, Unlevelled> {
+    pub(super) fn of_net(&mut self, net: NetId) -> Result<Literal, LevelisationError> {
         if let Class::Constant(value) = self.survey.class(net) {
             return Ok(Literal::FALSE.inverse_if(value));
         }
@@ -200,12 +200,12 @@ impl<'s> Expressions<'s> {
     }
 
     /// Notes what a register holds before the first edge.
-    fn hold(&mut self, q: Literal, starts: bool, net: NetId) -> Result<(), Unlevelled> {
+    fn hold(&mut self, q: Literal, starts: bool, net: NetId) -> Result<(), LevelisationError> {
         let value = starts ^ q.inverted;
         let toggles = matches!(self.nodes[q.node], Node::Toggle(_));
         let known = *self.held.entry((q.node, q.delay)).or_insert(value);
         if known != value || toggles && value {
-            return Err(Unlevelled::Start(self.survey.name(net)));
+            return Err(LevelisationError::Start(self.survey.name(net)));
         }
         Ok(())
     }

@@ -27,7 +27,7 @@ use super::parts::Parts;
 use super::stream::StreamTape;
 use super::survey::{Class, Survey, output};
 use super::tape::{Action, Code, PassTape, SINK, ZERO};
-use super::unlevelled::Unlevelled;
+use super::unlevelled::LevelisationError;
 use super::word::inversion;
 use crate::chip::{Exposure, SensorConfig, Silicon};
 use crate::netlist::{CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
@@ -47,7 +47,7 @@ type Node = (NetId, Edge);
 pub(super) type Bit = (u16, bool);
 
 /// A macropixel as two tapes.
-pub(super) struct Levelised {
+pub(super) struct LevelisedLogic {
     /// Photons, up to what the strobe samples.
     pub stream: StreamTape,
     /// Everything else.
@@ -129,7 +129,7 @@ struct Leveliser<'s> {
     drafts: Vec<Draft>,
 }
 
-impl Levelised {
+impl LevelisedLogic {
     /// Makes the tapes of a sensor's macropixel in this exposure.
     ///
     /// # Errors
@@ -138,10 +138,10 @@ impl Levelised {
         survey: &Survey,
         config: &SensorConfig,
         exposure: &Exposure,
-    ) -> Result<Self, Unlevelled> {
+    ) -> Result<Self, LevelisationError> {
         let mut leveliser = Leveliser {
             survey,
-            cell_library: Silicon::of(config).cell_library.cells(),
+            cell_library: Silicon::new(config).cell_library.cells(),
             config,
             period_fs: exposure.clock.period().as_fs(),
             fastest_fs: fastest_cell_fs(survey),
@@ -168,7 +168,7 @@ impl Levelised {
             .filter(|&net| net != survey.clk)
             .collect();
         let groups = survey.uniform_edges(config, exposure, &others);
-        let at = |time: Time| {
+        let clk_fall = |time: Time| {
             let k = (exposure
                 .clock
                 .half_periods_until(time + exposure.stop_phase))
@@ -179,7 +179,7 @@ impl Levelised {
         let mut causes: Vec<Vec<(i64, Cause)>> = Vec::new();
         for group in &groups {
             let of_group = group.iter().map(|edge| {
-                let (pass, position_fs) = at(edge.time);
+                let (pass, position_fs) = clk_fall(edge.time);
                 (
                     pass,
                     Cause {
@@ -239,7 +239,7 @@ impl Levelised {
                 .collect()
         });
         let places = usize::from(leveliser.next_place);
-        Ok(Levelised {
+        Ok(LevelisedLogic {
             stream,
             parts: Parts::new(&passes, places),
             passes,
@@ -253,7 +253,7 @@ impl Levelised {
 
 impl Leveliser<'_> {
     /// Walks back from the counts: what they never depend on needs no action.
-    fn find_live_cells(&mut self) -> Result<(), Unlevelled> {
+    fn find_live_cells(&mut self) -> Result<(), LevelisationError> {
         let survey = self.survey;
         let mut open: Vec<NetId> = survey.bins.iter().flatten().copied().collect();
         let mut seen: BTreeSet<usize> = BTreeSet::new();
@@ -264,7 +264,7 @@ impl Leveliser<'_> {
                 }
                 Class::Free => {
                     let Some((index, _)) = survey.driver[net.index()] else {
-                        return Err(Unlevelled::Structure(survey.name(net)));
+                        return Err(LevelisationError::Structure(survey.name(net)));
                     };
                     if !seen.insert(index) {
                         continue;
@@ -275,7 +275,7 @@ impl Leveliser<'_> {
                         let input = cell.input(pin);
                         if survey.class(input) == Class::Stream {
                             if cell.kind.triggers(pin) {
-                                return Err(Unlevelled::Structure(survey.name(input)));
+                                return Err(LevelisationError::Structure(survey.name(input)));
                             }
                             if !self.sampled.contains(&input) {
                                 self.sampled.push(input);
@@ -289,7 +289,7 @@ impl Leveliser<'_> {
                     }
                 }
                 Class::Constant(_) | Class::Static => {}
-                Class::Stream => return Err(Unlevelled::Structure(survey.name(net))),
+                Class::Stream => return Err(LevelisationError::Structure(survey.name(net))),
             }
         }
         Ok(())
@@ -301,11 +301,11 @@ impl Leveliser<'_> {
     }
 
     /// Where the value of a net is found.
-    fn bit(&mut self, net: NetId) -> Result<Bit, Unlevelled> {
+    fn bit(&mut self, net: NetId) -> Result<Bit, LevelisationError> {
         let survey = self.survey;
         let inverted = match survey.class(net) {
             Class::Constant(value) => return Ok((ZERO, value)),
-            Class::Stream => return Err(Unlevelled::Structure(survey.name(net))),
+            Class::Stream => return Err(LevelisationError::Structure(survey.name(net))),
             Class::Static | Class::Uniform => false,
             // A flip-flop is one bit, whichever of its outputs is read.
             Class::Free => matches!(survey.driver[net.index()], Some((_, 1))),
@@ -325,12 +325,12 @@ impl Leveliser<'_> {
     }
 
     /// Position of every draft on the tape.
-    fn order(&self) -> Result<Vec<usize>, Unlevelled> {
+    fn order(&self) -> Result<Vec<usize>, LevelisationError> {
         for draft in &self.drafts {
             for &woken in draft.wakes.iter().flatten() {
                 let wait = self.drafts[woken].arrival_fs - draft.arrival_fs;
                 if wait <= 0 || wait >= self.period_fs {
-                    return Err(Unlevelled::Structure(format!("a wait of {wait} fs")));
+                    return Err(LevelisationError::Structure(format!("a wait of {wait} fs")));
                 }
             }
         }
@@ -352,7 +352,9 @@ impl Leveliser<'_> {
                 let free =
                     (0..rest.len()).find(|&j| !rest.iter().any(|&other| reads(other, rest[j])));
                 let Some(j) = free else {
-                    return Err(Unlevelled::Structure("a ring of flip-flops".to_owned()));
+                    return Err(LevelisationError::Structure(
+                        "a ring of flip-flops".to_owned(),
+                    ));
                 };
                 group[i..=i + j].rotate_right(1);
             }
@@ -391,7 +393,9 @@ fn fastest_cell_fs(survey: &Survey) -> i64 {
     let cells = survey.netlist.cells().iter().enumerate();
     let delays = cells.flat_map(|(index, cell)| {
         let pins = (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin));
-        pins.flat_map(move |pin| &survey.timing.of(index)[pin][..cell.kind.outputs().len()])
+        pins.flat_map(move |pin| {
+            &survey.timing.cell_delays(index)[pin][..cell.kind.outputs().len()]
+        })
     });
     delays
         .map(|arc| i64::from(arc.rise_fs.min(arc.fall_fs)))

@@ -34,26 +34,26 @@ use rayon::prelude::*;
 
 use super::error::{has_no_delay_lines, refuse_races};
 use super::{
-    Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
-    full_stream,
+    Engine, EngineError, Expose, ExposureResult, Gate, Histograms, LitPixel, PulsedPixel, Replay,
+    follows, full_stream,
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::window_law::WindowLaw;
 use crate::chip::{Exposure, Sensor};
 use crate::photon::{PhotonStream, SpadEvent};
-use levelise::Levelised;
+use levelise::LevelisedLogic;
 use packing::{PERIODS, Packed};
 use schedule::Schedule;
 use stream::Flow;
 use survey::Survey;
 use tape::Block;
-pub use unlevelled::Unlevelled;
+pub use unlevelled::LevelisationError;
 use word::{WORD_LANES, Word, inversion};
 
 /// A netlist that can be run.
 struct Machine {
     survey: Survey,
-    levelised: Levelised,
+    levelised: LevelisedLogic,
 }
 
 /// Runs the levelised netlist.
@@ -62,10 +62,10 @@ pub struct Cycle {
     exposure: Exposure,
     law: WindowLaw,
     replays_control: bool,
-    machine: OnceLock<Result<Machine, Unlevelled>>,
+    machine: OnceLock<Result<Machine, LevelisationError>>,
 }
 
-/// Pulses, sorted for [`Cycle::run`].
+/// Pulses, sorted for [`Cycle::replay_packed`].
 pub struct PackedPulses {
     /// Macropixels of each block, by their index in the caller's order.
     blocks: Vec<(Vec<usize>, Packed)>,
@@ -94,11 +94,11 @@ impl Cycle {
         }
     }
 
-    fn machine(&self) -> Result<&Machine, &Unlevelled> {
+    fn machine(&self) -> Result<&Machine, &LevelisationError> {
         let machine = self.machine.get_or_init(|| {
             if self.sensor.front_end.joins() {
                 let wire = "the wire that all SPADs share".to_owned();
-                return Err(Unlevelled::Structure(wire));
+                return Err(LevelisationError::Structure(wire));
             }
             if self.sensor.front_end_block.is_some() {
                 let circuit = MacropixelCircuit::new(&self.sensor, (0, 0));
@@ -111,18 +111,18 @@ impl Cycle {
                 {
                     let what =
                         "a front end in which CLK sees SPADs after different times".to_owned();
-                    return Err(Unlevelled::Structure(what));
+                    return Err(LevelisationError::Structure(what));
                 }
             }
             let survey = Survey::new(&self.sensor, &self.exposure);
-            let levelised = Levelised::new(&survey, &self.sensor, &self.exposure)?;
+            let levelised = LevelisedLogic::new(&survey, &self.sensor, &self.exposure)?;
             Ok(Machine { survey, levelised })
         });
         machine.as_ref()
     }
 
     /// Why this sensor's macropixels cannot be levelised and are left to the gate engine, if so.
-    pub fn unlevelled(&self) -> Option<&Unlevelled> {
+    pub fn unlevelled(&self) -> Option<&LevelisationError> {
         self.machine().err()
     }
 
@@ -135,7 +135,7 @@ impl Cycle {
         self.clocked().div_ceil(PERIODS)
     }
 
-    /// Sorts pulses (one list per macropixel, by time) for [`Cycle::run`].
+    /// Sorts pulses (one list per macropixel, by time) for [`Cycle::replay_packed`].
     pub fn pack(&self, starts: &[u16], pulses: &[&[SpadEvent]]) -> PackedPulses {
         let mut order: Vec<usize> = (0..starts.len()).collect();
         // Counters that start alike open their windows, and come to rest, together.
@@ -154,16 +154,20 @@ impl Cycle {
     ///
     /// # Errors
     /// As [`Cycle::unlevelled`], or when an edge goes where the tape has no place for it.
-    pub fn run(&self, starts: &[u16], packed: &PackedPulses) -> Result<Histograms, Unlevelled> {
-        let machine = self.machine().map_err(Unlevelled::clone)?;
-        let blocks: Result<Vec<_>, Unlevelled> = packed
+    pub fn replay_packed(
+        &self,
+        starts: &[u16],
+        packed: &PackedPulses,
+    ) -> Result<Histograms, LevelisationError> {
+        let machine = self.machine().map_err(LevelisationError::clone)?;
+        let blocks: Result<Vec<_>, LevelisationError> = packed
             .blocks
             .par_iter()
             .map(|(pixels, pulses)| {
                 let starts: Vec<u16> = pixels.iter().map(|&pixel| starts[pixel]).collect();
                 let schedule =
                     Schedule::new(&machine.levelised.causes, &self.exposure, self.clocked());
-                machine.run(schedule, self.replays_control, &starts, pulses)
+                machine.replay_block(schedule, self.replays_control, &starts, pulses)
             })
             .collect();
         let mut histograms = Histograms::empty(starts.len(), self.sensor.bins);
@@ -178,14 +182,14 @@ impl Cycle {
 
 impl Machine {
     /// Histograms of one block.
-    fn run(
+    fn replay_block(
         &self,
         schedule: Schedule<'_>,
         replays_control: bool,
         starts: &[u16],
         pulses: &Packed,
-    ) -> Result<Histograms, Unlevelled> {
-        let Levelised {
+    ) -> Result<Histograms, LevelisationError> {
+        let LevelisedLogic {
             stream,
             passes: tape,
             parts,
@@ -193,7 +197,7 @@ impl Machine {
         } = &self.levelised;
         let mut block = Block::new(tape, self.start(starts)?);
         let mut flow = Flow::new(stream, pulses);
-        passes::run(
+        passes::run_passes(
             tape,
             parts,
             &mut block,
@@ -202,16 +206,18 @@ impl Machine {
             replays_control,
         );
         if let Some(place) = block.trapped {
-            return Err(Unlevelled::Trapped(self.name(place)));
+            return Err(LevelisationError::Trapped(self.name(place)));
         }
         if !block.is_settled() {
-            return Err(Unlevelled::Trapped("a net that does not settle".to_owned()));
+            return Err(LevelisationError::Trapped(
+                "a net that does not settle".to_owned(),
+            ));
         }
         Ok(self.counts(&block, starts.len()))
     }
 
     /// Every place of a block when the exposure starts. Lanes that are left over repeat the last start value.
-    fn start(&self, starts: &[u16]) -> Result<Vec<Word>, Unlevelled> {
+    fn start(&self, starts: &[u16]) -> Result<Vec<Word>, LevelisationError> {
         let mut words = vec![Word::ZERO; self.levelised.places];
         let last = *starts.last().expect("a block has a macropixel");
         for &(place, net, inverted) in &self.levelised.initial {
@@ -268,7 +274,7 @@ impl Replay for Cycle {
         let pulses: Vec<&[SpadEvent]> = seen.iter().map(|pulses| &**pulses).collect();
         refuse_races(&self.law, starts.iter().copied())?;
         if self.unlevelled().is_none()
-            && let Ok(histograms) = self.run(&starts, &self.pack(&starts, &pulses))
+            && let Ok(histograms) = self.replay_packed(&starts, &self.pack(&starts, &pulses))
         {
             return Ok(histograms);
         }
@@ -277,7 +283,11 @@ impl Replay for Cycle {
 }
 
 impl Expose for Cycle {
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError> {
         full_stream(self, stream, pixels)
     }
 }

@@ -117,7 +117,7 @@ impl Parts {
         let mut run_from = vec![None; tape.actions.len()];
         for (index, action) in samplers().filter(|&(index, _)| deferrable.contains(index)) {
             let tap = match action.code {
-                Code::Sampler { tap, offset } => tape.taps[usize::from(tap)].at(offset),
+                Code::Sampler { tap, offset } => tape.taps[usize::from(tap)].delayed_by(offset),
                 _ => unreachable!("a sampler"),
             };
             if let Some(run) = runs.last_mut().filter(|run| run.actions.end == index)
@@ -168,13 +168,13 @@ fn reached(tape: &PassTape, from: impl Iterator<Item = u16>) -> Bits {
 
 /// Whether CLK and what follows a sample leave each other alone.
 fn may_wait(tape: &PassTape, tail: &Bits, clocked: &Bits, places: usize) -> bool {
-    let of = |set: &Bits| -> Vec<&Action> {
+    let actions_in = |set: &Bits| -> Vec<&Action> {
         let actions = (0..).zip(&tape.actions);
         let chosen = actions.filter(|&(index, _)| set.contains(index));
         chosen.map(|(_, action)| action).collect()
     };
     let samplers = tape.actions.iter().filter(|a| is_sampler(a));
-    let (tail, clocked) = (of(tail), of(clocked));
+    let (tail, clocked) = (actions_in(tail), actions_in(clocked));
     if tail.iter().any(|action| is_sampler(action)) {
         return false;
     }

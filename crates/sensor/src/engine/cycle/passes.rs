@@ -33,7 +33,7 @@ const RECORDINGS: usize = 4;
 
 /// Runs all passes of one block, control in every laser cycle anew unless it may be replayed.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn run(
+pub(crate) fn run_passes(
     tape: &PassTape,
     parts: &Parts,
     block: &mut Block,
@@ -360,7 +360,7 @@ impl Passes<'_, '_> {
                 && self
                     .block
                     .pending
-                    .take(&self.parts.runs[usize::from(run)].actions)
+                    .remove_range(&self.parts.runs[usize::from(run)].actions)
             {
                 self.sample(usize::from(run));
                 return [true; 2];

@@ -7,7 +7,7 @@ use crate::chip::Exposure;
 
 /// The causes of an exposure, handed out in order.
 pub(super) struct Schedule<'a> {
-    /// Causes by group, as in [`Levelised`](super::levelise::Levelised).
+    /// Causes by group, as in [`LevelisedLogic`](super::levelise::LevelisedLogic).
     groups: &'a [Vec<(i64, u16)>],
     laser_cycles: i64,
     /// CLK periods of a laser cycle.

@@ -20,12 +20,12 @@ use multiversion::multiversion;
 
 use super::expression::{Expressions, Literal, Node};
 use super::packing::{PERIODS, Packed, Pulse};
-use super::unlevelled::Unlevelled;
+use super::unlevelled::LevelisationError;
 use super::word::{Word, inversion};
 use crate::netlist::NetId;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum OpKind {
     And,
     Xor,
     HalfAdder,
@@ -39,7 +39,7 @@ enum Kind {
 /// One operation over a chunk: places are word indices of its first period.
 #[derive(Debug, Clone, Copy)]
 struct Op {
-    kind: Kind,
+    kind: OpKind,
     inputs: [u32; 3],
     invert: [u64; 3],
     /// The result, and the carry of an adder.
@@ -83,7 +83,7 @@ impl StreamTape {
         expressions: &mut Expressions<'_>,
         spads: usize,
         nets: &[NetId],
-    ) -> Result<(Self, Vec<Tap>), Unlevelled> {
+    ) -> Result<(Self, Vec<Tap>), LevelisationError> {
         let roots: Result<Vec<Literal>, _> = nets.iter().map(|&n| expressions.of_net(n)).collect();
         let roots = roots?;
         let mut layout = Layout::new(expressions, &roots);
@@ -133,7 +133,7 @@ impl StreamTape {
                 words[place as usize + pulse.period()].flip(pulse.lane());
             }
         }
-        run(&self.ops, words);
+        apply_ops(&self.ops, words);
     }
 }
 
@@ -149,7 +149,7 @@ pub(super) struct Flow<'a> {
 
 impl Tap {
     /// The same sequence, `offset` periods later.
-    pub(super) fn at(self, offset: i8) -> Self {
+    pub(super) fn delayed_by(self, offset: i8) -> Self {
         Tap {
             place: self.place.wrapping_add_signed(offset.into()),
             ..self
@@ -324,23 +324,23 @@ impl Layout {
                 self.allocate(expressions, node, tape);
                 return;
             }
-            N::Toggle(_) => (Kind::Toggle, None),
-            N::Mux(..) => (Kind::Mux, None),
+            N::Toggle(_) => (OpKind::Toggle, None),
+            N::Mux(..) => (OpKind::Mux, None),
             N::And(a, b) => match partner(N::Xor(a, b)) {
-                Some(sum) => (Kind::HalfAdder, Some(sum)),
-                None => (Kind::And, None),
+                Some(sum) => (OpKind::HalfAdder, Some(sum)),
+                None => (OpKind::And, None),
             },
             N::Xor(a, b) => match partner(N::And(a, b)) {
-                Some(carry) => (Kind::HalfAdder, Some(carry)),
-                None => (Kind::Xor, None),
+                Some(carry) => (OpKind::HalfAdder, Some(carry)),
+                None => (OpKind::Xor, None),
             },
             N::Majority(a, b, c) => match partner(N::Xor3(a, b, c)) {
-                Some(sum) => (Kind::FullAdder, Some(sum)),
-                None => (Kind::Majority, None),
+                Some(sum) => (OpKind::FullAdder, Some(sum)),
+                None => (OpKind::Majority, None),
             },
             N::Xor3(a, b, c) => match partner(N::Majority(a, b, c)) {
-                Some(carry) => (Kind::FullAdder, Some(carry)),
-                None => (Kind::Xor3, None),
+                Some(carry) => (OpKind::FullAdder, Some(carry)),
+                None => (OpKind::Xor3, None),
             },
         };
         let literals = nodes[node].inputs();
@@ -388,7 +388,7 @@ fn chunk(words: &[Cell<Word>], place: u32) -> &[Cell<Word>] {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn run(ops: &[Op], words: &mut [Word]) {
+fn apply_ops(ops: &[Op], words: &mut [Word]) {
     let words = Cell::from_mut(words).as_slice_of_cells();
     for op in ops {
         let [a, b, c] = op.inputs;
@@ -399,27 +399,27 @@ fn run(ops: &[Op], words: &mut [Word]) {
         for t in 0..PERIODS {
             let (a, b) = (a[t].get(), b[t].get());
             match op.kind {
-                Kind::And => out[t].set((a ^ ia) & (b ^ ib)),
-                Kind::Xor => out[t].set(a ^ b),
-                Kind::HalfAdder => {
+                OpKind::And => out[t].set((a ^ ia) & (b ^ ib)),
+                OpKind::Xor => out[t].set(a ^ b),
+                OpKind::HalfAdder => {
                     out[t].set(a ^ b);
                     carry[t].set(a & b);
                 }
-                Kind::Xor3 => out[t].set(a ^ b ^ c[t].get()),
-                Kind::Majority => {
+                OpKind::Xor3 => out[t].set(a ^ b ^ c[t].get()),
+                OpKind::Majority => {
                     let (a, b, c) = (a ^ ia, b ^ ib, c[t].get() ^ ic);
                     out[t].set((a & b) | (a & c) | (b & c));
                 }
-                Kind::FullAdder => {
+                OpKind::FullAdder => {
                     let c = c[t].get();
                     out[t].set(a ^ b ^ c);
                     carry[t].set((a & b) | (a & c) | (b & c));
                 }
-                Kind::Mux => {
+                OpKind::Mux => {
                     let select = c[t].get();
                     out[t].set(((a ^ ia) & !select) | ((b ^ ib) & select));
                 }
-                Kind::Toggle => {
+                OpKind::Toggle => {
                     let state = words[op.out[0] as usize + t - 1].get();
                     out[t].set(state ^ a);
                 }

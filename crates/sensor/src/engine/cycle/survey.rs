@@ -16,7 +16,7 @@
 
 use std::collections::HashMap;
 
-use super::unlevelled::Unlevelled;
+use super::unlevelled::LevelisationError;
 use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, array};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};
@@ -74,9 +74,9 @@ impl Survey {
     /// Simulates power-up and load of every start value, and sorts the nets.
     pub(super) fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
         let netlist = Netlist::elaborate(&array::subarray(config, (0, 0), (1, 1)));
-        let timing = Silicon::of(config).timing(&netlist);
+        let timing = Silicon::new(config).timing(&netlist);
         let bins = Probes::of_macropixel(&netlist, 0, 0).bins().to_vec();
-        let pins = SensorPins::of(&netlist);
+        let pins = SensorPins::find(&netlist);
         let mut driver = vec![None; netlist.net_count()];
         for (index, cell) in netlist.cells().iter().enumerate() {
             for (output, net) in cell.outputs.iter().enumerate() {
@@ -103,7 +103,7 @@ impl Survey {
     ///
     /// # Errors
     /// When it is unknown.
-    pub(super) fn initial(&self, net: NetId, start: u16) -> Result<bool, Unlevelled> {
+    pub(super) fn initial(&self, net: NetId, start: u16) -> Result<bool, LevelisationError> {
         let (one, zero) = self.initial[usize::from(start) / LANES][net.index()];
         match (
             one >> (usize::from(start) % LANES) & 1,
@@ -111,7 +111,7 @@ impl Survey {
         ) {
             (1, _) => Ok(true),
             (_, 1) => Ok(false),
-            _ => Err(Unlevelled::Unknown(self.name(net))),
+            _ => Err(LevelisationError::Unknown(self.name(net))),
         }
     }
 

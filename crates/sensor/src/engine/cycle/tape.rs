@@ -139,7 +139,7 @@ impl Bits {
 
     /// Takes out a range of them, if all are in the set; whether they were.
     #[inline(always)]
-    pub(super) fn take(&mut self, range: &Range<u16>) -> bool {
+    pub(super) fn remove_range(&mut self, range: &Range<u16>) -> bool {
         for index in range.start..range.end {
             if !self.contains(index) {
                 return false;
@@ -280,7 +280,7 @@ fn sampled(action: &Action, words: &[Word], taps: &[Tap], flow: &mut Flow<'_>, p
         unreachable!("a sampler")
     };
     let edge = clocked(action, words);
-    let data = flow.read(taps[usize::from(tap)].at(offset), pass);
+    let data = flow.read(taps[usize::from(tap)].delayed_by(offset), pass);
     (words[usize::from(action.out)] & !edge) | (data & edge)
 }
 

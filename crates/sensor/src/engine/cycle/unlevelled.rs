@@ -3,7 +3,7 @@
 /// Why a netlist has no tape.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Unlevelled {
+pub enum LevelisationError {
     /// A net is X when the exposure starts.
     #[error("{0} is unknown when the exposure starts")]
     Unknown(String),

@@ -25,7 +25,7 @@ use self::orders::{Delays, Orders, Part, Setting};
 use super::error::{follows, has_no_delay_lines};
 use super::traits::by_own_clk;
 use super::{
-    Cycle, Engine, EngineError, Expose, Exposed, Gate, Histograms, LaneSimulation, LitPixel,
+    Cycle, Engine, EngineError, Expose, ExposureResult, Gate, Histograms, LaneSimulation, LitPixel,
     PulsedPixel, Replay, Window, full_stream,
 };
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
@@ -77,7 +77,7 @@ pub struct Timed {
 }
 
 /// What a look at a macropixel's delays leads to.
-enum Judged {
+enum TimedOutcome {
     Counted(Vec<u16>),
     ForCycle(Vec<SpadEvent>),
     InDoubt(Doubt),
@@ -88,7 +88,7 @@ impl Timed {
     pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure, runner: Runner) -> Self {
         let made: Sensor = sensor.into();
         let silicon = *made.silicon();
-        let sensor = made.made_of(&Silicon::of(&made));
+        let sensor = made.made_of(&Silicon::new(&made));
         // Macropixels differ in the names of their cells only.
         let circuit = MacropixelCircuit::new(&sensor, (0, 0));
         let mut engine = Timed {
@@ -125,10 +125,10 @@ impl Timed {
     }
 
     /// Counts in closed form where a macropixel's delays decide every order of events.
-    fn judge(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
+    fn count_in_closed_form(&self, pixel: &PulsedPixel<'_>) -> Result<TimedOutcome, EngineError> {
         match self.uniform.tdc {
             Tdc::Clocked => {}
-            Tdc::Counter => return Ok(Judged::InDoubt(Doubt::CounterTdc)),
+            Tdc::Counter => return Ok(TimedOutcome::InDoubt(Doubt::CounterTdc)),
             Tdc::DelayLine => return self.judge_lines(pixel),
         }
         let pulses = &*by_own_clk(&self.uniform, pixel.number, pixel.pulses);
@@ -136,29 +136,31 @@ impl Timed {
         let orders = self.orders_of(&timing);
         let parts = match orders.parts(&self.setting, pixel.start) {
             Ok(parts) => parts,
-            Err(doubt) => return Ok(Judged::InDoubt(doubt)),
+            Err(doubt) => return Ok(TimedOutcome::InDoubt(doubt)),
         };
         let window = self.common.window(pixel.start).open();
         let is_common = |part: &Part| part.first_edge == window.map(|w| w.first_edge);
         let is_levelled = self.runner == Runner::Cycle && self.cycle.unlevelled().is_none();
         if is_levelled && window.is_some() && parts.iter().all(is_common) {
             let pulses = orders.shifted(&self.common, pulses);
-            return Ok(Judged::ForCycle(pulses));
+            return Ok(TimedOutcome::ForCycle(pulses));
         }
         let counts = self.by_laws(&orders, parts, pixel.start, pulses)?;
-        Ok(Judged::Counted(counts))
+        Ok(TimedOutcome::Counted(counts))
     }
 
     /// The same where delay lines time photons, whose law is that of their silicon.
-    fn judge_lines(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
+    fn judge_lines(&self, pixel: &PulsedPixel<'_>) -> Result<TimedOutcome, EngineError> {
         if self.silicon.mismatch.is_some() {
-            return Ok(Judged::InDoubt(Doubt::DelayLines));
+            return Ok(TimedOutcome::InDoubt(Doubt::DelayLines));
         }
         let window = Window::new(&self.uniform, &self.setting.exposure);
         match window.replay(std::slice::from_ref(pixel)) {
-            Ok(counts) => Ok(Judged::Counted(counts.into_counts())),
-            Err(EngineError::Race { race, .. }) => Ok(Judged::InDoubt(Doubt::Race(race.what))),
-            Err(EngineError::Irregular(why)) => Ok(Judged::InDoubt(Doubt::Irregular(why))),
+            Ok(counts) => Ok(TimedOutcome::Counted(counts.into_counts())),
+            Err(EngineError::Race { race, .. }) => {
+                Ok(TimedOutcome::InDoubt(Doubt::Race(race.what)))
+            }
+            Err(EngineError::Irregular(why)) => Ok(TimedOutcome::InDoubt(Doubt::Irregular(why))),
             Err(other) => Err(other),
         }
     }
@@ -187,26 +189,26 @@ impl Timed {
     fn run_cycle(
         &self,
         pixels: &[PulsedPixel<'_>],
-        judged: &mut [Judged],
+        judged: &mut [TimedOutcome],
     ) -> Result<(), EngineError> {
-        let is_for_cycle = |judged: &Judged| matches!(judged, Judged::ForCycle(_));
+        let is_for_cycle = |judged: &TimedOutcome| matches!(judged, TimedOutcome::ForCycle(_));
         let places: Vec<usize> = (0..judged.len())
             .filter(|&place| is_for_cycle(&judged[place]))
             .collect();
         for places in places.chunks(self.cycle.batch()) {
             let shifted = places.iter().map(|&place| match &judged[place] {
                 // By the CLK of the first column.
-                Judged::ForCycle(pulses) => PulsedPixel {
+                TimedOutcome::ForCycle(pulses) => PulsedPixel {
                     number: 0,
                     pulses,
                     ..pixels[place]
                 },
-                Judged::Counted(_) | Judged::InDoubt(_) => unreachable!("filtered"),
+                TimedOutcome::Counted(_) | TimedOutcome::InDoubt(_) => unreachable!("filtered"),
             });
             let shifted: Vec<PulsedPixel<'_>> = shifted.collect();
             let counts = self.cycle.replay(&shifted)?;
             for (&place, counts) in places.iter().zip(&counts) {
-                judged[place] = Judged::Counted(counts.to_vec());
+                judged[place] = TimedOutcome::Counted(counts.to_vec());
             }
         }
         Ok(())
@@ -287,9 +289,9 @@ impl Timed {
 
     fn orders(&self, timing: &Timing) -> Orders {
         let paths = self.circuit.paths(timing);
-        let macropixel = MacropixelDelays::of(&paths);
+        let macropixel = MacropixelDelays::measure(&paths);
         let is_guided = self.setting.sensor.mode == Mode::Guided;
-        let counter = is_guided.then(|| CounterDelays::of(&paths, &macropixel));
+        let counter = is_guided.then(|| CounterDelays::measure(&paths, &macropixel));
         let delays = Delays {
             macropixel,
             counter,
@@ -333,12 +335,12 @@ impl Replay for Timed {
         let arrive = self.arrive(pixels.iter().map(|pixel| pixel.start));
         let judge = |pixel: &PulsedPixel<'_>| {
             if arrive[&pixel.start] {
-                self.judge(pixel)
+                self.count_in_closed_form(pixel)
             } else {
-                Ok(Judged::InDoubt(Doubt::Load))
+                Ok(TimedOutcome::InDoubt(Doubt::Load))
             }
         };
-        let judged: Result<Vec<Judged>, EngineError> = pixels.par_iter().map(judge).collect();
+        let judged: Result<Vec<TimedOutcome>, EngineError> = pixels.par_iter().map(judge).collect();
         let mut judged = judged?;
         self.run_cycle(pixels, &mut judged)?;
 
@@ -347,15 +349,15 @@ impl Replay for Timed {
         let mut in_doubt = Vec::new();
         for (place, judged) in judged.into_iter().enumerate() {
             match judged {
-                Judged::Counted(counts) => {
+                TimedOutcome::Counted(counts) => {
                     coverage.decided += 1;
                     histograms[place].copy_from_slice(&counts);
                 }
-                Judged::InDoubt(doubt) => {
+                TimedOutcome::InDoubt(doubt) => {
                     *coverage.replayed.entry(doubt).or_default() += 1;
                     in_doubt.push(place);
                 }
-                Judged::ForCycle(_) => unreachable!("the cycle engine has run"),
+                TimedOutcome::ForCycle(_) => unreachable!("the cycle engine has run"),
             }
         }
         let doubtful: Vec<PulsedPixel<'_>> = in_doubt.iter().map(|&place| pixels[place]).collect();
@@ -378,7 +380,11 @@ impl Replay for Timed {
 }
 
 impl Expose for Timed {
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError> {
         full_stream(self, stream, pixels)
     }
 }

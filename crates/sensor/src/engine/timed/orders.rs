@@ -15,8 +15,8 @@
 use super::doubt::Doubt;
 use crate::chip::p_counter::{Rises, starts_high};
 use crate::chip::timing::CounterTiming;
-use crate::chip::timing::macropixel::{CounterDelays, MacropixelDelays, Span, hull, spread};
-use crate::chip::window_law::{Window, WindowLaw};
+use crate::chip::timing::macropixel::{CounterDelays, DelaySpan, MacropixelDelays, hull, spread};
+use crate::chip::window_law::{WindowLaw, WindowOutcome};
 use crate::chip::{
     AfterBorrow, ChipTiming, Conflict, Exposure, Mode, Overflow, Sensor, SensorConfig,
 };
@@ -33,7 +33,7 @@ const MARGIN: Time = Time::from_ps(1);
 pub(super) struct Orders {
     law: WindowLaw,
     /// CLK rises → what each bin takes changes.
-    shift: Vec<Span>,
+    shift: Vec<DelaySpan>,
     latency: Vec<Time>,
     /// What is in doubt for every start value.
     doubt: Option<Doubt>,
@@ -53,13 +53,13 @@ pub(super) struct Delays {
 
 impl Delays {
     /// CLK falls (guided) or STOP rises (conventional) → STROBE rises.
-    fn strobe(&self) -> Span {
+    fn strobe(&self) -> DelaySpan {
         let counter = self.counter.as_ref();
         counter.map_or(self.macropixel.stop_strobe, |counter| counter.strobe)
     }
 
     /// COUNTER_RESET falls (guided) or STOP rises (conventional) → HIT's reset ends.
-    fn hit_release(&self) -> Span {
+    fn hit_release(&self) -> DelaySpan {
         let counter = self.counter.as_ref();
         counter.map_or(self.macropixel.stop_hit_release, |counter| {
             counter.hit_release
@@ -102,7 +102,7 @@ impl Orders {
             law: WindowLaw::with_timing(&setting.sensor, &setting.exposure, timing),
             shift: delays.macropixel.shift.clone(),
             latency: rises.map(|&(rise, _)| rise).collect(),
-            doubt: always(setting, delays),
+            doubt: common_doubt(setting, delays),
             counter_clk: counter.map_or(Time::ZERO, |c| c.counter_clk.0),
             reset: delays.macropixel.reset.1,
         }
@@ -130,12 +130,12 @@ impl Orders {
             bins: (0..config.bins).collect(),
         };
         match self.law.window(start) {
-            Window::Open(window) => Ok(vec![whole(Some(window.first_edge))]),
-            Window::Irregular(why) => Err(Doubt::Irregular(why)),
-            Window::Race(_) => self.bin_by_bin(setting, start),
-            Window::Never => {
+            WindowOutcome::Open(window) => Ok(vec![whole(Some(window.first_edge))]),
+            WindowOutcome::Irregular(why) => Err(Doubt::Irregular(why)),
+            WindowOutcome::Race(_) => self.bin_by_bin(setting, start),
+            WindowOutcome::Never => {
                 // No count is earlier than the one of CLK's first falling edge.
-                let is_reset_first = Rises::of(config, start).is_none_or(|rises| {
+                let is_reset_first = Rises::from_start_value(config, start).is_none_or(|rises| {
                     let count = exposure.falling(rises.first) + self.counter_clk;
                     count > exposure.stop(1) + self.reset + MARGIN
                 });
@@ -258,7 +258,7 @@ fn guided(setting: &Setting, delays: &Delays, counter: &CounterDelays) -> ChipTi
 }
 
 /// The first thing in doubt for every start value.
-fn always(setting: &Setting, delays: &Delays) -> Option<Doubt> {
+fn common_doubt(setting: &Setting, delays: &Delays) -> Option<Doubt> {
     let (config, exposure, schedule) = (&setting.sensor, &setting.exposure, setting.schedule);
     let (strobe, hit_release) = (delays.strobe(), delays.hit_release());
     let counter = delays.counter.as_ref();

@@ -18,9 +18,9 @@
 use multiversion::multiversion;
 
 use super::codes::{Code, Codes, SPAD_BITS, bin_mark, spad_mark};
-use super::echo_rows::{EchoRows, Passed};
+use super::echo_rows::{EchoRows, PassedEdges};
 use super::sight::ROUNDING_FS;
-use crate::photon::{Draw, PER_BLOCK, PixelStream, Place, Slots, TIME_BITS};
+use crate::photon::{Draw, GroupPlace, PER_BLOCK, PixelStream, Slots, TIME_BITS};
 
 /// Binary places of a position in CLK periods.
 const FRACTION_BITS: u32 = 24;
@@ -37,7 +37,7 @@ const ALIGNED_FS: i64 = 2;
 pub(super) struct Scratch {
     slot_codes: Vec<Code>,
     slot_marks: Vec<u32>,
-    passed: Passed,
+    passed: PassedEdges,
 }
 
 /// Bins of one window. Times are relative to the start of bin 0.
@@ -80,7 +80,7 @@ impl Binning {
     }
 
     /// The row of a slot.
-    pub(super) fn row_of(&self, wanted: &Wanted, slot: u32) -> usize {
+    pub(super) fn row_of(&self, wanted: &PhotonSelection, slot: u32) -> usize {
         let k = self.slots.per_period_bits;
         row_of(slot, wanted.origin_slot, k, self.bins) as usize
     }
@@ -91,7 +91,7 @@ impl Binning {
         &self,
         light: &PixelStream<'_>,
         draw: &Draw,
-        wanted: &Wanted,
+        wanted: &PhotonSelection,
         echo: Option<&EchoRows>,
         scratch: &mut Scratch,
         codes: &mut Codes,
@@ -154,7 +154,12 @@ impl Binning {
     }
 
     /// Appends the code of one photon, as place and time after the start of its cycle.
-    pub(super) fn push(&self, wanted: &Wanted, photon: Option<(Place, i64)>, codes: &mut Codes) {
+    pub(super) fn push(
+        &self,
+        wanted: &PhotonSelection,
+        photon: Option<(GroupPlace, i64)>,
+        codes: &mut Codes,
+    ) {
         let (code, mark) = codes.append(1);
         (code[0], mark[0]) = match photon {
             Some((place, time_fs)) => {
@@ -211,7 +216,12 @@ fn row_of(slot: u32, origin_slot: i32, k: u32, bins: u32) -> u32 {
 
 /// The codes and marks of a photon in each slot, but for its place.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn encode_slots(binning: &Binning, wanted: &Wanted, slots: &[u32], out: (&mut [Code], &mut [u32])) {
+fn encode_slots(
+    binning: &Binning,
+    wanted: &PhotonSelection,
+    slots: &[u32],
+    out: (&mut [Code], &mut [u32]),
+) {
     let (bins, k) = (binning.bins, binning.slots.per_period_bits);
     let (origin_slot, later) = (wanted.origin_slot, wanted.place(0));
     for ((&slot, code), mark) in slots.iter().zip(out.0).zip(out.1) {
@@ -248,7 +258,7 @@ fn doubt(steps: u32, words: &[u32], codes: &mut [Code]) {
 
 /// Which photons of a draw are wanted, and what for.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Wanted {
+pub(super) struct PhotonSelection {
     /// Those of cycles before this one of the group.
     pub cycles: u32,
     /// By how many cycles their windows come after them.
@@ -259,7 +269,7 @@ pub(super) struct Wanted {
     pub origin_slot: i32,
 }
 
-impl Wanted {
+impl PhotonSelection {
     /// The place of a photon's window.
     #[inline(always)]
     pub(super) fn place(&self, place: u32) -> u32 {
@@ -271,7 +281,7 @@ impl Wanted {
 mod tests {
     use super::*;
     use crate::chip::SpadGrid;
-    use crate::photon::{GROUP, Group, PhotonStream, SpadModel, StreamConfig};
+    use crate::photon::{CycleGroup, GROUP, PhotonStream, SpadModel, StreamConfig};
     use crate::units::{Frequency, Time};
     use proptest::prelude::*;
 
@@ -319,8 +329,8 @@ mod tests {
             let periods = (time_fs - origin_fs) as f64 / period_fs;
             let row = (periods.floor() + 1.0).clamp(0.0, bins as f64 + 1.0) as usize;
             let off_edge_fs = (periods - periods.round()).abs() * period_fs;
-            let wanted = Wanted { cycles, later, origin_fs, origin_slot };
-            let group = Group::of_cycle(GROUP, SpadGrid::default());
+            let wanted = PhotonSelection { cycles, later, origin_fs, origin_slot };
+            let group = CycleGroup::of_cycle(GROUP, SpadGrid::default());
             let mut codes = Codes::default();
             let mut in_slot = (vec![Code::NONE], vec![0]);
             encode_slots(&binning, &wanted, &[slot], (&mut in_slot.0, &mut in_slot.1));

@@ -16,7 +16,7 @@
 
 use smallvec::SmallVec;
 
-use super::binning::{Binning, Scratch, Wanted};
+use super::binning::{Binning, PhotonSelection, Scratch};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
 use super::past::PastDraws;
@@ -24,10 +24,10 @@ use super::pulses::Window;
 use super::sight::{ROUNDING_FS, Sight, Spans};
 use super::table;
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
-use crate::engine::Work;
+use crate::engine::EngineWork;
 use crate::photon::{
-    DeadTimeLaw, Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place,
-    SpadEvent, SpadRows,
+    CycleGroup, DeadTimeLaw, Draw, GroupPlace, ListedEchoes, PER_BLOCK, Photon, PhotonStream,
+    PixelStream, SpadEvent, SpadRows,
 };
 use crate::units::Time;
 use cycle_window::CycleWindow;
@@ -52,7 +52,7 @@ pub(super) struct Counting<'a> {
     /// What a CLK period adds to its bin, by the number of SPADs that fired.
     adds: Vec<i64>,
     spacing: Spacing,
-    plain: Drawn,
+    plain: GroupDraws,
     breeding: ByWindow,
     /// Photons of parts of the light that are kept by window.
     layers: Vec<ByWindow>,
@@ -90,24 +90,24 @@ pub(super) struct Counting<'a> {
 
 /// What was drawn of a group.
 #[derive(Debug, Default)]
-struct Drawn {
+struct GroupDraws {
     /// Photons of the windows' own cycles.
     own: Draw,
     /// Photons of the group's cycles for the windows of the next cycles.
     previous: Draw,
     /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
-    carried: Vec<(Place, i64)>,
+    carried: Vec<(GroupPlace, i64)>,
 }
 
-impl Drawn {
-    fn draw(&mut self, light: &PixelStream<'_>, group: Group, spans: &Spans) -> u64 {
+impl GroupDraws {
+    fn draw(&mut self, light: &PixelStream<'_>, group: CycleGroup, spans: &Spans) -> u64 {
         light.draw(group, &spans.own, &mut self.own);
         light.draw(group, &spans.previous, &mut self.previous);
         (self.own.len() + self.previous.len()) as u64
     }
 
     /// Keeps what the first window of the next group may see.
-    fn carry(&mut self, light: &PixelStream<'_>, group: Group) {
+    fn carry(&mut self, light: &PixelStream<'_>, group: CycleGroup) {
         self.carried.clear();
         if self.previous.is_empty() {
             return;
@@ -117,7 +117,7 @@ impl Drawn {
                 .photons(light, group.cycles())
                 .filter_map(|(place, time_fs)| {
                     let (cycle, spad) = group.split(place);
-                    (cycle + 1 == group.cycles()).then_some((Place::from(spad), time_fs))
+                    (cycle + 1 == group.cycles()).then_some((GroupPlace::from(spad), time_fs))
                 });
         self.carried.extend(photons);
     }
@@ -127,7 +127,7 @@ impl Drawn {
         &'d self,
         light: &'d PixelStream<'d>,
         stream: &'d PhotonStream,
-        group: Group,
+        group: CycleGroup,
         cycles: u32,
     ) -> impl Iterator<Item = (u32, Photon)> + 'd {
         let first = group.first_cycle();
@@ -135,7 +135,7 @@ impl Drawn {
             Photon::new(
                 stream.cycle_start(cycle) + Time::from_fs(time_fs),
                 spad,
-                light.breeds(),
+                light.has_secondaries(),
             )
         };
         let own = self
@@ -178,10 +178,10 @@ struct Pixel<'p> {
     /// The photons that do, where there is but one layer.
     breeding: Option<&'p PixelStream<'p>>,
     /// Photons of `plain.own` and `plain.previous`.
-    wanted: [Wanted; 2],
+    wanted: [PhotonSelection; 2],
     echo: Option<EchoRows>,
     hits: Vec<i64>,
-    work: Work,
+    work: EngineWork,
     /// In bright light: how long before a window its photons are drawn from at first.
     look_back: Time,
     /// And the parts of the light that may have photons there.
@@ -205,14 +205,14 @@ impl<'a> Counting<'a> {
                 blind: dead_rows,
             },
             adds: (0..=stream.spads()).map(adds).collect(),
-            plain: Drawn::default(),
+            plain: GroupDraws::default(),
             breeding: ByWindow::default(),
             layers: Vec::new(),
             past: PastDraws::default(),
             codes: Codes::default(),
             scratch: Scratch::default(),
             first_code: [0; 2],
-            tables: Tables::take(),
+            tables: Tables::from_pool(),
             together: Vec::new(),
             fired: [0; ROWS],
             pulses_fs: Vec::new(),
@@ -234,14 +234,18 @@ impl<'a> Counting<'a> {
     }
 
     /// Hits of every bin of a macropixel, and what they took. `parts` are those of its light ([`PhotonStream::parts`]).
-    pub(super) fn expose(&mut self, sight: &Sight, parts: &[PixelStream<'_>]) -> (Vec<i64>, Work) {
+    pub(super) fn expose(
+        &mut self,
+        sight: &Sight,
+        parts: &[PixelStream<'_>],
+    ) -> (Vec<i64>, EngineWork) {
         let light = &parts[0];
         let breeding = parts.get(BREEDING).filter(|_| light.is_alone);
         let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs];
         let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
         let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
         let has_marks = self.stream.spads() == SPADS;
-        let wanted = [0, 1].map(|later| Wanted {
+        let wanted = [0, 1].map(|later| PhotonSelection {
             cycles: 0,
             later,
             origin_fs: origins_fs[later as usize],
@@ -260,7 +264,7 @@ impl<'a> Counting<'a> {
                 .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs))
                 .flatten(),
             hits: self.engine.law.empty_hits(&sight.window),
-            work: Work::default(),
+            work: EngineWork::default(),
             look_back: Time::ZERO,
             near: SmallVec::new(),
         };
@@ -334,7 +338,7 @@ impl<'a> Counting<'a> {
                 .encode(pixel.light, draw, wanted, echo, scratch, &mut self.codes);
             self.first_code[part] = self.codes.len;
         }
-        let wanted = Wanted {
+        let wanted = PhotonSelection {
             cycles: 1,
             later: 0,
             ..pixel.wanted[1]
@@ -346,7 +350,7 @@ impl<'a> Counting<'a> {
         self.codes.len
     }
 
-    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
+    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup) {
         let own = pixel.wanted[0];
         // Where all background photons of the cycles are wanted, their slots tell how many there are in each bin.
         let mut counted = 0;
@@ -358,7 +362,7 @@ impl<'a> Counting<'a> {
             }
         }
         self.tables
-            .put(&self.codes, group.cycles() as usize, counted);
+            .put_group(&self.codes, group.cycles() as usize, counted);
         if pixel.breeding.is_some() {
             self.count_breeding_cycles(pixel, group);
         }
@@ -371,7 +375,7 @@ impl<'a> Counting<'a> {
 
     /// When a photon came, relative to the start of the laser cycle of its window.
     fn time_of(&self, light: &PixelStream<'_>, photon: usize, laser_cycle: u32) -> Time {
-        let Drawn {
+        let GroupDraws {
             own,
             previous,
             carried,
@@ -383,7 +387,7 @@ impl<'a> Counting<'a> {
         } else {
             carried[photon - self.first_code[1]].1
         };
-        Time::from_fs(time_fs) - self.before(laser_cycle)
+        Time::from_fs(time_fs) - self.previous_cycle_length(laser_cycle)
     }
 
     /// Whether a photon, perhaps of the echo, is one of those drawn.
@@ -436,7 +440,7 @@ impl<'a> Counting<'a> {
     }
 
     /// How long before a laser cycle the one before it starts.
-    fn before(&self, laser_cycle: u32) -> Time {
+    fn previous_cycle_length(&self, laser_cycle: u32) -> Time {
         let start = |cycle| self.stream.cycle_start(cycle);
         start(laser_cycle) - start(laser_cycle - 1)
     }
@@ -445,7 +449,7 @@ impl<'a> Counting<'a> {
 impl Pixel<'_> {
     /// What is drawn of a part of the light.
     fn spans(&self, part: &PixelStream<'_>) -> &Spans {
-        if part.breeds() {
+        if part.has_secondaries() {
             &self.sight.breeding
         } else {
             &self.sight.plain
@@ -454,7 +458,7 @@ impl Pixel<'_> {
 
     /// Whether avalanches cause others.
     fn has_secondaries(&self) -> bool {
-        self.parts.iter().any(PixelStream::breeds)
+        self.parts.iter().any(PixelStream::has_secondaries)
     }
 
     /// Whether windows see no echo of another cycle than their own.

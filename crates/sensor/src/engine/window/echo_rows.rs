@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::binning::Wanted;
+use super::binning::PhotonSelection;
 use super::codes::Code;
 use super::sight::ROUNDING_FS;
 use crate::photon::{LANES, PixelStream, RANKS, signal_rank};
@@ -39,7 +39,7 @@ const TOGETHER: usize = 2 * LANES;
 
 /// Room for what is found out about photons.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Passed {
+pub(super) struct PassedEdges {
     ranks: Vec<i16>,
     /// How many edges they have passed for certain.
     pub rows: Vec<i16>,
@@ -47,7 +47,7 @@ pub(super) struct Passed {
     pub possible: Vec<i16>,
 }
 
-impl Passed {
+impl PassedEdges {
     /// Finds out about photons with these random words, low and high, a multiple of [`LANES`], that have passed `first_row` edges
     /// before these.
     pub(super) fn compare(&mut self, first_row: i16, edges: &[[i16; 2]], words: [&[u32]; 2]) {
@@ -102,10 +102,10 @@ impl EchoRows {
     /// Codes and marks of photons with these random words, low and high, a multiple of [`LANES`].
     pub(super) fn encode(
         &self,
-        wanted: &Wanted,
+        wanted: &PhotonSelection,
         place_shift: u32,
         [low, high]: [&[u32]; 2],
-        passed: &mut Passed,
+        passed: &mut PassedEdges,
         (codes, marks): (&mut [Code], &mut [u32]),
     ) {
         passed.compare(self.first_row, &self.edges, [low, high]);
@@ -114,7 +114,7 @@ impl EchoRows {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn compare(passed: &mut Passed, edges: &[[i16; 2]], [low, high]: [&[u32]; 2]) {
+fn compare(passed: &mut PassedEdges, edges: &[[i16; 2]], [low, high]: [&[u32]; 2]) {
     for ((rank, &low), &high) in passed.ranks.iter_mut().zip(low).zip(high) {
         *rank = signal_rank(low, high);
     }
@@ -130,10 +130,10 @@ fn compare(passed: &mut Passed, edges: &[[i16; 2]], [low, high]: [&[u32]; 2]) {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn encode(
     rows: &EchoRows,
-    wanted: &Wanted,
+    wanted: &PhotonSelection,
     place_shift: u32,
     high: &[u32],
-    passed: &Passed,
+    passed: &PassedEdges,
     codes: &mut [Code],
     marks: &mut [u32],
 ) {

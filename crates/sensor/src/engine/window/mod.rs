@@ -25,8 +25,8 @@ use std::borrow::Cow;
 use super::exposing::refuse_other_spads;
 use super::traits::by_own_clk;
 use super::{
-    Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
-    Work,
+    Cancelling, Engine, EngineError, EngineWork, Expose, ExposureResult, Histograms, LitPixel,
+    PulsedPixel, Replay,
 };
 use crate::chip::WindowLaw;
 use crate::chip::window_law::OpenWindow;
@@ -36,7 +36,7 @@ pub use pulses::Window;
 use sight::Sight;
 
 /// A window that opens, and what decides its histogram where that is a part of every laser cycle.
-type Opened = (OpenWindow, Option<Sight>);
+type SightedWindow = (OpenWindow, Option<Sight>);
 
 impl Window {
     /// Whether all photons of a macropixel are drawn, and not only those that its window may see: laser cycles hardly
@@ -58,19 +58,20 @@ impl Window {
         pixel: &LitPixel,
         light: &PixelLight,
         window: &OpenWindow,
-    ) -> (Vec<i64>, Work) {
+    ) -> (Vec<i64>, EngineWork) {
         let config = stream.config();
-        let cancelling = Cancelling::of(config.spads.shortest_dead_time(), config.clock, || {
-            self.law.clone()
-        });
+        let cancelling =
+            Cancelling::from_law(config.spads.shortest_dead_time(), config.clock, || {
+                self.law.clone()
+            });
         let mut hits = self.law.empty_hits(window);
-        let mut work = Work::default();
+        let mut work = EngineWork::default();
         let mut cancelled = 0;
         let mut count = |pulses: &[SpadEvent]| {
             self.count_pulses(pulses, window, &mut hits);
             let seen = cancelling
                 .as_ref()
-                .map(|cancelling| cancelling.seen(pixel.start, pulses));
+                .map(|cancelling| cancelling.cancelled_pulses(pixel.start, pulses));
             cancelled += seen.unwrap_or(0);
         };
         // Pulses that the next ones may share a bin with.
@@ -137,11 +138,15 @@ impl Replay for Window {
 }
 
 impl Expose for Window {
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+    fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+    ) -> Result<ExposureResult, EngineError> {
         refuse_other_spads(stream, pixels)?;
         self.refuse(pixels.iter().map(|pixel| pixel.start))?;
         if self.sensor.has_own_laws() && !self.is_of_macropixel {
-            let mut exposed = Exposed::new(self.sensor.bins);
+            let mut exposed = ExposureResult::new(self.sensor.bins);
             for pixel in pixels {
                 let engine = self.of_macropixel(pixel.number);
                 let alone = engine.expose(stream, std::slice::from_ref(pixel))?;
@@ -151,9 +156,9 @@ impl Expose for Window {
             return Ok(exposed);
         }
         let mut counting = Counting::new(self, stream);
-        let mut exposed = Exposed::new(self.sensor.bins);
+        let mut exposed = ExposureResult::new(self.sensor.bins);
         // Many exposures of one macropixel, as a sweep takes them, are in one window.
-        let mut last: Option<(u16, Option<Opened>)> = None;
+        let mut last: Option<(u16, Option<SightedWindow>)> = None;
         let clk_periods =
             u64::from(self.exposure.stop_periods) * u64::from(self.exposure.laser_cycles);
         for pixel in pixels {

@@ -11,7 +11,7 @@
 //! A draw has the photons of a slot in all laser cycles of a group. They are kept by cycle, for the next window of the group
 //! that asks for them.
 
-use crate::photon::{Draw, Group, Photon, PhotonStream, PixelStream, Span};
+use crate::photon::{CycleGroup, Draw, Photon, PhotonStream, PixelStream, Span};
 use crate::units::Time;
 
 /// Photons of a macropixel from some slot on, ever further back.
@@ -73,17 +73,17 @@ impl<'a> Past<'a> {
         let mut push = |cycle: u32, (_, time_fs, spad): PastPhoton| {
             let time = start(cycle) + Time::from_fs(time_fs);
             if time >= Time::ZERO && spads >> spad & 1 != 0 {
-                photons.push(Photon::new(time, spad, light.breeds()));
+                photons.push(Photon::new(time, spad, light.has_secondaries()));
             }
         };
-        for photon in draws.of(light, part, self.cycle, What::Slot(self.slot)) {
+        for photon in draws.photons(light, part, self.cycle, What::Slot(self.slot)) {
             push(self.cycle, photon);
         }
         for later in light.echoes_within(&(slot_fs..end_fs)) {
             if let Some(cycle) = self.cycle_after(later) {
                 let moved_fs = (start(cycle) - start(self.cycle)).as_fs();
                 let within_fs = slot_fs - moved_fs..end_fs - moved_fs;
-                let echo = draws.of(light, part, cycle, What::Echo);
+                let echo = draws.photons(light, part, cycle, What::Echo);
                 echo.filter(|(_, time_fs, _)| within_fs.contains(time_fs))
                     .for_each(|photon| push(cycle, photon));
             }
@@ -115,7 +115,7 @@ pub(super) struct PastDraws {
 /// Photons of one part of the light in all laser cycles of a group.
 #[derive(Debug)]
 struct PastDraw {
-    key: (usize, What, Group),
+    key: (usize, What, CycleGroup),
     /// By laser cycle.
     photons: Vec<PastPhoton>,
 }
@@ -137,7 +137,7 @@ impl PastDraws {
     }
 
     /// The photons of a laser cycle. `light` is part number `part` of the macropixel's.
-    fn of(
+    fn photons(
         &mut self,
         light: &PixelStream<'_>,
         part: usize,
@@ -161,7 +161,7 @@ impl PastDraws {
     }
 
     /// Draws photons, and returns where they are kept.
-    fn draw(&mut self, light: &PixelStream<'_>, key: (usize, What, Group)) -> usize {
+    fn draw(&mut self, light: &PixelStream<'_>, key: (usize, What, CycleGroup)) -> usize {
         let (_, what, group) = key;
         let span = match what {
             What::Slot(slot) => Span {

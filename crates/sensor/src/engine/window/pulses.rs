@@ -87,7 +87,7 @@ impl Window {
         if !self.law.has_clk_bins() {
             return self.count_between_edges(pulses, window, hits);
         }
-        for (edge, spads) in taken(pulses, |pulse| self.law.edge_of(pulse.time)) {
+        for (edge, spads) in odd_spads_by(pulses, |pulse| self.law.edge_of(pulse.time)) {
             let adds = self.adds(spads);
             if adds != 0 {
                 for bin in self.law.bins_of_edge(window, edge) {
@@ -104,11 +104,11 @@ impl Window {
         event_of: impl Fn(&P) -> SpadEvent,
     ) {
         let stage = self.law.timing().photon_line_stage;
-        let of = |pulse: &P| {
+        let time_and_spad = |pulse: &P| {
             let event = event_of(pulse);
             (event.time, event.spad)
         };
-        photon_line::model(pulses, of, self.sensor.spads(), stage);
+        photon_line::model(pulses, time_and_spad, self.sensor.spads(), stage);
     }
 
     /// The same by the edges of the bins, whatever those are: laser cycle by laser cycle, leaving out those without pulses.
@@ -132,7 +132,7 @@ impl Window {
                 let within = pulses.partition_point(|pulse| pulse.time < seen.end);
                 let edges = self.law.edges(window, cycle);
                 let bin_of = |pulse: &SpadEvent| edges.bin_of(pulse.time);
-                for (bin, spads) in taken(&pulses[..within], bin_of) {
+                for (bin, spads) in odd_spads_by(&pulses[..within], bin_of) {
                     let bin = bin.expect("a window is its bins");
                     hits[bin] += self.adds(spads);
                 }
@@ -152,7 +152,7 @@ impl Window {
 }
 
 /// Pulses grouped by what takes them, a CLK edge or a bin, and the SPADs with an odd number of them.
-fn taken<'p, K: PartialEq + 'p>(
+fn odd_spads_by<'p, K: PartialEq + 'p>(
     pulses: &'p [SpadEvent],
     taker_of: impl Fn(&SpadEvent) -> K + 'p,
 ) -> impl Iterator<Item = (K, u64)> + 'p {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::echo_rows::{Passed, shorten};
+use super::echo_rows::{PassedEdges, shorten};
 use super::sight::ROUNDING_FS;
 use super::table::Layout;
 use crate::photon::PixelStream;
@@ -33,7 +33,7 @@ impl RowRanks {
 
     /// The rows of photons with these random words, low and high, a multiple of [`LANES`](crate::photon::LANES): 0 is before all of
     /// them.
-    pub(super) fn compare(&self, words: [&[u32]; 2], passed: &mut Passed) {
+    pub(super) fn compare(&self, words: [&[u32]; 2], passed: &mut PassedEdges) {
         passed.compare(self.first_row, &self.edges, words);
     }
 }

@@ -47,9 +47,9 @@ impl Spans {
             }
             let background_until_fs = (until_fs - all.margin_fs()).max(ends.start + 1);
             let last = all
-                .at(background_until_fs.min(ends.end) - 1)
+                .slot_at(background_until_fs.min(ends.end) - 1)
                 .min(all.count - 1);
-            let first = all.at(from_fs.max(ends.start)).min(last);
+            let first = all.slot_at(from_fs.max(ends.start)).min(last);
             first..last + 1
         };
         let own = slots(from_fs, until_fs);

@@ -76,7 +76,7 @@ impl Table {
 
     /// Puts a photon.
     #[inline]
-    pub(super) fn put(&mut self, row: usize, place: u32) {
+    pub(super) fn put_photon(&mut self, row: usize, place: u32) {
         let (at, bit) = ((place / WORD) as usize, 1 << (place % WORD));
         let word = &mut self.words[row * ROW + at];
         self.doubt[at] |= *word & bit;
@@ -200,7 +200,7 @@ pub(super) struct Places {
 
 impl Places {
     #[inline(always)]
-    pub(super) fn of(self, word: u32) -> u32 {
+    pub(super) fn place(self, word: u32) -> u32 {
         (word >> self.shift) + self.later
     }
 }
@@ -214,7 +214,7 @@ fn put_words<const TWICE: bool>(
 ) -> u64 {
     let mut seen = 0;
     for &word in words.into_iter().flatten() {
-        let of_word = place.of(word);
+        let of_word = place.place(word);
         let (at, bit) = ((of_word / WORD) as usize, 1 << (of_word % WORD));
         let word = &mut row[at];
         if TWICE {
@@ -237,7 +237,7 @@ fn put_rows<const TWICE: bool>(
 ) {
     let rows = rows.iter().zip(possible);
     for ((number, &word), (&row, &possible)) in (0..).zip(words).zip(rows) {
-        let place = place.of(word);
+        let place = place.place(word);
         let (at, bit) = ((place / WORD) as usize, 1 << (place % WORD));
         if row != possible {
             unknown.push(number);

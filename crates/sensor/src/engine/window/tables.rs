@@ -67,11 +67,11 @@ thread_local! {
 
 impl Tables {
     /// Tables to count in, whatever they hold.
-    pub(super) fn take() -> Self {
+    pub(super) fn from_pool() -> Self {
         KEPT.take().unwrap_or_default()
     }
 
-    /// For this thread's next [`Tables::take`].
+    /// For this thread's next [`Tables::from_pool`].
     pub(super) fn keep(self) {
         KEPT.set(Some(self));
     }
@@ -110,15 +110,16 @@ impl Tables {
     /// Puts the photons of a group of `cycles` laser cycles, at most [`MOST_PHOTONS`], filled up to a multiple of
     /// [`SIDE_BY_SIDE`]. The first ones have been counted by row ([`Tables::add`]), the rest from `counted` on, a
     /// multiple as well, are counted here.
-    pub(super) fn put(&mut self, codes: &Codes, cycles: usize, counted: usize) {
+    pub(super) fn put_group(&mut self, codes: &Codes, cycles: usize, counted: usize) {
         debug_assert!(codes.len <= MOST_PHOTONS && codes.len.is_multiple_of(SIDE_BY_SIDE));
         debug_assert!(counted.is_multiple_of(SIDE_BY_SIDE));
         // The cycle of what is no photon need not be empty.
         self.cycles[..cycles].fill(0);
         let (first_codes, codes_to_count) = codes.codes().split_at(counted);
         let (first_marks, marks_to_count) = codes.marks().split_at(counted);
-        let specials = put::<false>(self, (first_codes, first_marks), 0, 0);
-        self.specials = put::<true>(self, (codes_to_count, marks_to_count), counted, specials);
+        let specials = put_photons::<false>(self, (first_codes, first_marks), 0, 0);
+        self.specials =
+            put_photons::<true>(self, (codes_to_count, marks_to_count), counted, specials);
         for photon in codes.doubtful() {
             self.special[self.specials] = (photon as u64 + 1) << PHOTON_SHIFT | u64::from(u32::MAX);
             self.specials += 1;
@@ -154,7 +155,7 @@ impl Tables {
     }
 
     /// The photon of the same cycle before this one.
-    pub(super) fn before(&self, photon: usize) -> Option<usize> {
+    pub(super) fn previous_photon(&self, photon: usize) -> Option<usize> {
         usize::from(self.before[photon]).checked_sub(1)
     }
 
@@ -167,7 +168,7 @@ impl Tables {
 
 /// Puts photons numbered from `number` + 1 on; counts them by row or not. Returns how many specials there are then.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2"))]
-fn put<const COUNTED: bool>(
+fn put_photons<const COUNTED: bool>(
     tables: &mut Tables,
     (codes, marks): (&[Code], &[u32]),
     number: usize,

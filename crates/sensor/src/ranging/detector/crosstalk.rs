@@ -9,7 +9,7 @@
 //! What is known so goes into the mean histogram beside echo and background. An echo has the noise of three numbers, and bins have that of each.
 //! So light that is no echo of the pulse must be measured for much longer than the captures that it is used for.
 
-use super::{Counted, DetectedReturn, Detector, SurfaceLight};
+use super::{CountedEvents, DetectedReturn, Detector, SurfaceLight};
 use crate::ranging::DepthOptions;
 use crate::ranging::peak::median;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -31,7 +31,7 @@ impl Detector {
         let photons = sums.iter().map(|&count| {
             let count = f64::from(count);
             match cycles {
-                Some(cycles) if self.counted == Counted::First => {
+                Some(cycles) if self.counted == CountedEvents::First => {
                     let share = (count / left.max(1.0)).min(0.999);
                     left -= count;
                     -cycles * libm::log1p(-share)
@@ -94,7 +94,7 @@ impl Detector {
             let spread_s = 2.0 * spread_m / SPEED_OF_LIGHT_M_PER_S;
             let widened = Detector {
                 pulse_sigma_s: libm::hypot(self.pulse_sigma_s, spread_s),
-                counted: Counted::Every,
+                counted: CountedEvents::Every,
                 ..self.clone()
             };
             let mean = widened.expected(&SurfaceLight {

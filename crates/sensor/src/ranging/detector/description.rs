@@ -14,7 +14,7 @@ use std::f64::consts::LN_2;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Coincidence, Counted, Detector};
+use super::{Coincidence, CountedEvents, Detector};
 
 /// The longest bin over the mean one, and the mean one over the shortest: chosen. The search for peaks would see little in more unequal ones.
 const MOST_UNEQUAL: f64 = 4.0;
@@ -32,7 +32,7 @@ pub struct DetectorDescription {
     /// Full width at half maximum of the laser pulse with all jitter.
     pub pulse_fwhm_ns: Option<f64>,
     /// Which events count; every one if missing.
-    pub counts: Option<Counted>,
+    pub counts: Option<CountedEvents>,
     /// Laser cycles of a histogram.
     pub laser_cycles: Option<u32>,
     /// Counts at which a bin stops.
@@ -71,7 +71,7 @@ impl DetectorDescription {
     pub fn detector(&self, bins: usize) -> Result<Detector, BadDetector> {
         let edges_s = self.edges_s(bins)?;
         let fwhm_ns = needed("pulse_fwhm_ns", self.pulse_fwhm_ns)?;
-        within("pulse_fwhm_ns", fwhm_ns, (0.0, 1e6))?;
+        check_within("pulse_fwhm_ns", fwhm_ns, (0.0, 1e6))?;
         let all_ns = 1e9 * (edges_s[bins] - edges_s[0]);
         if fwhm_ns > 0.5 * all_ns * (1.0 + 1e-9) {
             let message = format!(
@@ -79,11 +79,11 @@ impl DetectorDescription {
             );
             return Err(bad("pulse_fwhm_ns", message));
         }
-        let counted = self.counts.unwrap_or(Counted::Every);
+        let counted = self.counts.unwrap_or(CountedEvents::Every);
         let coincidence = self.coincidence.map(checked).transpose()?;
         match self.laser_cycles {
             Some(0) => return Err(bad("laser_cycles", "0 is impossible; give 1 or more")),
-            None if counted == Counted::First => {
+            None if counted == CountedEvents::First => {
                 let message =
                     "is needed where only the first event of a laser cycle counts; give 1 or more";
                 return Err(bad("laser_cycles", message));
@@ -111,9 +111,9 @@ impl DetectorDescription {
     fn edges_s(&self, bins: usize) -> Result<Vec<f64>, BadDetector> {
         let Some(edges_ns) = &self.bin_edges_ns else {
             let bin_ns = needed("bin_width_ns", self.bin_width_ns)?;
-            within("bin_width_ns", bin_ns, (1e-3, 1e6))?;
+            check_within("bin_width_ns", bin_ns, (1e-3, 1e6))?;
             let start_ns = self.start_ns.unwrap_or(0.0);
-            within("start_ns", start_ns, (-1e9, 1e9))?;
+            check_within("start_ns", start_ns, (-1e9, 1e9))?;
             return Ok(Detector::equal_edges_s(
                 bins,
                 1e-9 * start_ns,
@@ -166,13 +166,13 @@ fn checked(coincidence: DescribedCoincidence) -> Result<Coincidence, BadDetector
         within_ns,
         of,
     } = coincidence;
-    within("coincidence.within_ns", within_ns, (1e-3, 1e6))?;
-    within("coincidence.of", f64::from(of), (1.0, 1024.0))?;
-    within("coincidence.spads", f64::from(spads), (1.0, f64::from(of)))?;
+    check_within("coincidence.within_ns", within_ns, (1e-3, 1e6))?;
+    check_within("coincidence.of", f64::from(of), (1.0, 1024.0))?;
+    check_within("coincidence.spads", f64::from(spads), (1.0, f64::from(of)))?;
     Ok(Coincidence {
         spads,
         within_s: 1e-9 * within_ns,
-        of,
+        lit_spads: of,
     })
 }
 
@@ -187,7 +187,11 @@ fn needed(key: &'static str, value: Option<f64>) -> Result<f64, BadDetector> {
     value.ok_or_else(|| bad(key, "is needed to make depths of bins; give it"))
 }
 
-fn within(key: &'static str, value: f64, (least, most): (f64, f64)) -> Result<(), BadDetector> {
+fn check_within(
+    key: &'static str,
+    value: f64,
+    (least, most): (f64, f64),
+) -> Result<(), BadDetector> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
@@ -245,7 +249,7 @@ mod tests {
             ..plain()
         };
         let first = DetectorDescription {
-            counts: Some(Counted::First),
+            counts: Some(CountedEvents::First),
             ..plain()
         };
         let faults = [

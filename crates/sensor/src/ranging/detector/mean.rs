@@ -3,7 +3,7 @@
 //! Counts are compared by χ²: bins are put together with the next ones until five counts are expected. Where only first events count,
 //! laser cycles without any are a further cell. Source: Pearson 1900; five is the usual least (Cochran 1954).
 
-use super::{Counted, Detector};
+use super::{CountedEvents, Detector};
 use crate::numerics::intervals::chi_squared_above;
 use crate::ranging::EchoLight;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -73,10 +73,10 @@ impl Detector {
             None => cells.push((counted, mean)),
         }
         let mut freedom = cells.len();
-        if self.counted == Counted::First
+        if self.counted == CountedEvents::First
             && let Some(laser_cycles) = self.laser_cycles
         {
-            let sum = |of: fn(&(f64, f64)) -> f64| cells.iter().map(of).sum::<f64>();
+            let sum = |term: fn(&(f64, f64)) -> f64| cells.iter().map(term).sum::<f64>();
             let without = f64::from(laser_cycles) - sum(|cell| cell.1);
             let counted = f64::from(laser_cycles) - sum(|cell| cell.0);
             if without >= LEAST_EXPECTED {

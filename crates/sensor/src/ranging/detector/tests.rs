@@ -8,7 +8,7 @@ use super::*;
 const BINS: usize = 64;
 const LASER_CYCLES: u32 = 2000;
 
-fn detector(counted: Counted) -> Detector {
+fn detector(counted: CountedEvents) -> Detector {
     Detector {
         edges_s: Detector::equal_edges_s(BINS, 20e-9, 1e-9),
         pulse_sigma_s: 0.8e-9,
@@ -21,7 +21,7 @@ fn detector(counted: Counted) -> Detector {
 }
 
 /// Bins whose lengths go from a half to one and a half of the mean and back.
-fn unequal(counted: Counted) -> Detector {
+fn unequal(counted: CountedEvents) -> Detector {
     let mut edges_s = vec![20e-9];
     for bin in 0..BINS {
         let length_s = 1e-9 * (1.0 + 0.5 * libm::sin(bin as f64 * 0.9));
@@ -33,11 +33,11 @@ fn unequal(counted: Counted) -> Detector {
     }
 }
 
-fn together(counted: Counted, spads: u32) -> Detector {
+fn together(counted: CountedEvents, spads: u32) -> Detector {
     let coincidence = Coincidence {
         spads,
         within_s: 4e-9,
-        of: 16,
+        lit_spads: 16,
     };
     Detector {
         coincidence: Some(coincidence),
@@ -103,11 +103,11 @@ fn histogram(random: &mut StdRng, detector: &Detector, light: &Light) -> Vec<u32
     let Coincidence {
         spads,
         within_s,
-        of,
+        lit_spads: of,
     } = detector.coincidence.unwrap_or(Coincidence {
         spads: 1,
         within_s: 0.0,
-        of: 1,
+        lit_spads: 1,
     });
     // Background comes before the first bin, too.
     let before_s = 2.0 * within_s;
@@ -138,7 +138,7 @@ fn histogram(random: &mut StdRng, detector: &Detector, light: &Light) -> Vec<u32
             // An event before the first bin or after the last one is none that the detector sees.
             if (1..=bins).contains(&bin) {
                 counts[bin - 1] += 1;
-                if detector.counted == Counted::First {
+                if detector.counted == CountedEvents::First {
                     break;
                 }
             }
@@ -182,7 +182,7 @@ fn assert_within_bounds(detector: &Detector, seed: u64, light: &Light) {
 
 #[test]
 fn depths_of_photons_drawn_one_by_one_keep_their_bounds() {
-    for counted in [Counted::Every, Counted::First] {
+    for counted in [CountedEvents::Every, CountedEvents::First] {
         for detector in [detector(counted), unequal(counted)] {
             for (signal, background) in [(0.05, 0.2), (0.3, 0.5), (1.5, 0.5)] {
                 assert_within_bounds(&detector, 1, &Light::new(45e-9, signal, background));
@@ -193,7 +193,7 @@ fn depths_of_photons_drawn_one_by_one_keep_their_bounds() {
 
 #[test]
 fn depths_of_spads_that_fire_together_keep_their_bounds() {
-    for counted in [Counted::Every, Counted::First] {
+    for counted in [CountedEvents::Every, CountedEvents::First] {
         for (spads, signal, background) in
             [(2, 0.5, 0.5), (2, 1.5, 2.0), (2, 4.0, 1.0), (3, 4.0, 4.0)]
         {
@@ -205,11 +205,11 @@ fn depths_of_spads_that_fire_together_keep_their_bounds() {
 
 #[test]
 fn a_surface_beside_a_cover_glass_keeps_its_bound() {
-    for counted in [Counted::Every, Counted::First] {
+    for counted in [CountedEvents::Every, CountedEvents::First] {
         for mut detector in [detector(counted), unequal(counted)] {
             let glass = Light::new(GLASS_S, 0.3, 0.0);
             let every = Detector {
-                counted: Counted::Every,
+                counted: CountedEvents::Every,
                 ..detector.clone()
             };
             detector.crosstalk = every.expected(&glass.of_histogram());
@@ -239,7 +239,7 @@ fn a_surface_beside_a_cover_glass_keeps_its_bound() {
 fn bins_that_stop_have_no_bound_that_is_too_short() {
     let stops = Detector {
         most_counts: Some(255),
-        ..detector(Counted::Every)
+        ..detector(CountedEvents::Every)
     };
     let mut random = StdRng::seed_from_u64(5);
     let (mut saturated, mut depths) = (0, 0);
@@ -267,7 +267,7 @@ fn bins_that_stop_have_no_bound_that_is_too_short() {
 fn background_alone_has_no_return_and_impossible_counts_are_refused() {
     let mut random = StdRng::seed_from_u64(6);
     let options = DepthOptions::default();
-    for counted in [Counted::Every, Counted::First] {
+    for counted in [CountedEvents::Every, CountedEvents::First] {
         for detector in [detector(counted), unequal(counted), together(counted, 2)] {
             for _ in 0..50 {
                 let dark = histogram(&mut random, &detector, &Light::new(40e-9, 0.0, 0.8));
@@ -278,14 +278,14 @@ fn background_alone_has_no_return_and_impossible_counts_are_refused() {
     }
     let mut many = vec![0; BINS];
     many[3] = LASER_CYCLES + 1;
-    assert!(detector(Counted::Every).check(&many).is_ok());
-    assert!(detector(Counted::First).check(&many).is_err());
+    assert!(detector(CountedEvents::Every).check(&many).is_ok());
+    assert!(detector(CountedEvents::First).check(&many).is_err());
 }
 
 /// Detectors, and light whose counts are to agree with their means.
 fn known_means() -> Vec<(Detector, Light)> {
     let mut cases = Vec::new();
-    for counted in [Counted::Every, Counted::First] {
+    for counted in [CountedEvents::Every, CountedEvents::First] {
         let light = Light::new(45.2e-9, 0.1, 0.2);
         cases.push((detector(counted), light));
         cases.push((unequal(counted), light));
@@ -340,17 +340,17 @@ fn means_of_first_events_are_right_to_a_part_of_their_noise() {
     const HISTOGRAMS: u32 = 50;
     for (detector, light, most) in [
         (
-            together(Counted::First, 2),
+            together(CountedEvents::First, 2),
             Light::new(45.2e-9, 3.0, 6.0),
             1.2,
         ),
         (
-            together(Counted::First, 3),
+            together(CountedEvents::First, 3),
             Light::new(45.2e-9, 6.0, 12.0),
             2.5,
         ),
         (
-            together(Counted::Every, 2),
+            together(CountedEvents::Every, 2),
             Light::new(45.2e-9, 3.0, 6.0),
             0.6,
         ),
@@ -372,18 +372,18 @@ fn means_of_first_events_are_right_to_a_part_of_their_noise() {
 
 #[test]
 fn first_photons_are_no_more_than_laser_cycles() {
-    let first = detector(Counted::First);
+    let first = detector(CountedEvents::First);
     let light = Light::new(50.5e-9, 5.0, 8.0).of_histogram();
     let all: f64 = first.expected(&light).iter().sum();
     assert!(all < f64::from(LASER_CYCLES) && all > 0.999 * f64::from(LASER_CYCLES));
-    let same = detector(Counted::Every).expected(&light);
+    let same = detector(CountedEvents::Every).expected(&light);
     assert!((same.iter().sum::<f64>() / f64::from(LASER_CYCLES) - 13.0).abs() < 1e-6);
     assert_eq!(same.len(), BINS);
 }
 
 #[test]
 fn counts_where_none_can_be_do_not_agree() {
-    let every = detector(Counted::Every);
+    let every = detector(CountedEvents::Every);
     let mut counts = vec![0; BINS];
     assert_eq!(every.agreement(&counts, &[0.0; BINS]).p, 1.0);
     counts[4] = 1;
@@ -402,12 +402,12 @@ fn a_glass_is_found_from_captures_without_a_target_and_from_those_with_one() {
         }
         sums
     };
-    for counted in [Counted::Every, Counted::First] {
+    for counted in [CountedEvents::Every, CountedEvents::First] {
         // Bins that begin before the glass, whose light comes at nearly no distance.
         let near = detector(counted).later(-23.7e-9);
         let moved = |place_s: f64| place_s - 23.7e-9;
         let every = Detector {
-            counted: Counted::Every,
+            counted: CountedEvents::Every,
             ..near.clone()
         };
         let glass = Light::new(moved(GLASS_S), 0.4, 0.0);
@@ -429,7 +429,7 @@ fn a_glass_is_found_from_captures_without_a_target_and_from_those_with_one() {
         // A target beside it.
         let mut sums = sum_of(&mut random, &near, &alone);
         let target = Light::new(moved(45e-9), 0.5, 0.0);
-        if counted == Counted::Every {
+        if counted == CountedEvents::Every {
             let more = sum_of(&mut random, &near, &target);
             sums.iter_mut().zip(more).for_each(|(sum, n)| *sum += n);
         }

@@ -48,14 +48,19 @@ fn information_is_that_of_a_bin_that_counts_or_does_not() {
     let config = SensorConfig::default();
     let response = Response::new(&config, 1.0 / config.clk_hz, PULSE_SIGMA);
     for signal in [0.3, 3.0, 30.0] {
-        let at = |position_bins: f64| EchoLight {
+        let echo_light = |position_bins: f64| EchoLight {
             position_bins,
             signal,
             background_per_bin: 0.05,
             sigma_bins: response.pulse_sigma_bins,
         };
-        let [before, after] = [7.3 - 1e-5, 7.3 + 1e-5].map(|place| response.chances(&at(place)));
-        for (bin, (chance, told)) in response.information(&at(7.3)).into_iter().enumerate() {
+        let [before, after] =
+            [7.3 - 1e-5, 7.3 + 1e-5].map(|place| response.chances(&echo_light(place)));
+        for (bin, (chance, told)) in response
+            .information(&echo_light(7.3))
+            .into_iter()
+            .enumerate()
+        {
             let slope = (after[bin] - before[bin]) / 2e-5;
             let wanted = slope * slope / (chance * (1.0 - chance));
             assert!(
@@ -86,14 +91,14 @@ fn the_dark_stands_still() {
         };
         let response = Response::new(&config, 1.0 / config.clk_hz, PULSE_SIGMA);
         for background_per_bin in [0.01, 0.3, 3.0] {
-            let at = |position_bins: f64| EchoLight {
+            let echo_light = |position_bins: f64| EchoLight {
                 position_bins,
                 signal: 1e-9,
                 background_per_bin,
                 sigma_bins: 0.7,
             };
             // Long before all bins, and after them.
-            let [stepped, steady] = [-40.0, 60.0].map(|place| response.chances(&at(place)));
+            let [stepped, steady] = [-40.0, 60.0].map(|place| response.chances(&echo_light(place)));
             let worst = stepped
                 .iter()
                 .zip(&steady)

@@ -19,7 +19,7 @@ fn echoes_that_are_no_pulse_are_wide_or_told() {
     let config = SensorConfig::default();
     let finder = finder(&config, 520);
     let response = Response::new(&config, finder.bin_s, PULSE_SIGMA);
-    let of = |light: EchoLight| -> Vec<u32> {
+    let counts = |light: EchoLight| -> Vec<u32> {
         response
             .chances(&light)
             .iter()
@@ -34,7 +34,7 @@ fn echoes_that_are_no_pulse_are_wide_or_told() {
         sigma_bins,
     };
     let found = finder
-        .find(&of(EchoLight {
+        .find(&counts(EchoLight {
             sigma_bins: 2.0 * sigma_bins,
             ..echo
         }))
@@ -46,9 +46,9 @@ fn echoes_that_are_no_pulse_are_wide_or_told() {
     );
     assert!((light.position_bins - 6.3).abs() < 0.02, "{light:?}");
     // Another echo besides is not the first one's.
-    let both: Vec<u32> = of(echo)
+    let both: Vec<u32> = counts(echo)
         .iter()
-        .zip(of(EchoLight {
+        .zip(counts(EchoLight {
             position_bins: 12.5,
             signal: 0.5,
             ..echo
@@ -82,7 +82,7 @@ fn echoes_that_are_no_pulse_are_wide_or_told() {
         Some(WalkLeft::NotOneEcho)
     );
     // What is left of a strong echo that came before the window looks like a weak one.
-    let before = of(EchoLight {
+    let before = counts(EchoLight {
         position_bins: -1.4,
         signal: 100.0,
         ..echo
@@ -128,13 +128,13 @@ fn what_keeps_range_walk_in_is_named() {
 
 #[test]
 fn full_bins_are_told_from_peaks() {
-    let of = |event_type, threshold| SensorConfig {
+    let sensor = |event_type, threshold| SensorConfig {
         bin_bits: 5,
         event_type,
         threshold,
         ..SensorConfig::default()
     };
-    let finder = self::finder(&of(EventType::Greater, 0), 520);
+    let finder = self::finder(&sensor(EventType::Greater, 0), 520);
     let saturated = |counts: &[u32]| finder.find(counts).unwrap().is_saturated;
     assert!(saturated(&[31; 16]));
     let mut counts = [2; 16];
@@ -153,7 +153,7 @@ fn full_bins_are_told_from_peaks() {
     assert!(!saturated(&counts));
     assert_eq!(finder.find(&[0; 16]), None);
     // Where light makes bins count less, those beside an echo are full.
-    let finder = self::finder(&of(EventType::Less, 1), 520);
+    let finder = self::finder(&sensor(EventType::Less, 1), 520);
     let mut counts = [31; 16];
     counts[7..10].copy_from_slice(&[20, 3, 18]);
     assert!(finder.find(&counts).unwrap().is_saturated);
@@ -210,7 +210,7 @@ fn an_echo_is_lost_where_it_is_strong_and_its_place_open() {
             background_per_bin: 0.02,
             sigma_bins: 0.74,
         };
-        finder.is_lost(&Corrected { light, bound_bins })
+        finder.is_lost(&CorrectedPeak { light, bound_bins })
     };
     // A photon for every SPAD, and a quarter of a bin.
     let found =

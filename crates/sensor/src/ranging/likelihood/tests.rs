@@ -67,14 +67,14 @@ fn bins() -> impl Strategy<Value = Range<usize>> {
 }
 
 /// The determinant of what a matrix has in these rows and columns, along the first row.
-fn minor(rows: &[usize], cols: &[usize], at: &dyn Fn(usize, usize) -> f64) -> f64 {
+fn minor(rows: &[usize], cols: &[usize], entry: &dyn Fn(usize, usize) -> f64) -> f64 {
     let Some((&row, rows)) = rows.split_first() else {
         return 1.0;
     };
     let of_col = |(n, &col): (usize, &usize)| {
         let others: Vec<usize> = cols.iter().copied().filter(|&other| other != col).collect();
         let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
-        sign * at(row, col) * minor(rows, &others, at)
+        sign * entry(row, col) * minor(rows, &others, entry)
     };
     cols.iter().enumerate().map(of_col).sum()
 }
@@ -128,8 +128,8 @@ proptest! {
         }).collect();
         let chances = chances(&light);
         let local = local_at(&likelihood, light, Steps::Coarse);
-        let sum = |of: &dyn Fn(usize, f64) -> f64| -> f64 {
-            bins.clone().map(|bin| of(bin, chances[bin].clamp(1e-9, 1.0 - 1e-9))).sum()
+        let sum = |term: &dyn Fn(usize, f64) -> f64| -> f64 {
+            bins.clone().map(|bin| term(bin, chances[bin].clamp(1e-9, 1.0 - 1e-9))).sum()
         };
         for i in 0..parameters {
             let score = |bin: usize, p: f64| (counts[bin] / p - (CYCLES - counts[bin]) / (1.0 - p)) * slopes[i][bin];

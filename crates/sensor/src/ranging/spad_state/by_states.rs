@@ -10,7 +10,7 @@ const SMALL: usize = 40;
 
 /// What a bin saw: avalanches, those by crosstalk, and the chance that their number is odd.
 #[derive(Debug, Clone, Copy, Default)]
-struct Seen {
+struct BinAvalanches {
     fired: f64,
     by_crosstalk: f64,
     odd: f64,
@@ -27,7 +27,7 @@ struct Mass {
 }
 
 /// Under `light` photons in every step, after the first as many in all steps before; small steps of which the first order is kept.
-fn by_states(dead: &Dead, light: &[f64]) -> Vec<Seen> {
+fn by_states(dead: &Dead, light: &[f64]) -> Vec<BinAvalanches> {
     let dt = 1.0 / (STEPS * SMALL) as f64;
     let small = (dead.time_bins / dt).round() as usize;
     let before = (60.0 * (1.0 + dead.time_bins)) as usize * STEPS;
@@ -49,7 +49,7 @@ fn by_states(dead: &Dead, light: &[f64]) -> Vec<Seen> {
     for (step, photons) in steps.enumerate() {
         if step % STEPS == 0 {
             states.forget_signs();
-            seen.push(Seen::default());
+            seen.push(BinAvalanches::default());
         }
         let bin = seen.last_mut().unwrap();
         for _ in 0..SMALL {
@@ -92,7 +92,7 @@ impl States<'_> {
     }
 
     /// A small step under `photons` photons in a bin, of a SPAD that light does not keep blind.
-    fn fire(&mut self, photons: f64, seen: &mut Seen) {
+    fn fire(&mut self, photons: f64, seen: &mut BinAvalanches) {
         let (dead, ready) = (self.dead, &mut self.ready);
         let back = self.blind[self.oldest];
         let crosstalk = dead.crosstalk * photons * (ready.plain + ready.trapped);
@@ -127,7 +127,7 @@ impl States<'_> {
     }
 
     /// The same of one that all light keeps blind, where afterpulses come as light.
-    fn fire_or_blind(&mut self, photons: f64, seen: &mut Seen) {
+    fn fire_or_blind(&mut self, photons: f64, seen: &mut BinAvalanches) {
         let dead = self.dead;
         let afterpulses = self.released / dead.afterpulse_bins;
         self.released +=
@@ -162,7 +162,7 @@ impl States<'_> {
     }
 }
 
-fn by_sums(dead: &Dead, light: &[f64]) -> Vec<Seen> {
+fn by_sums(dead: &Dead, light: &[f64]) -> Vec<BinAvalanches> {
     let constant = Dual::<0>::constant;
     let mut spad = Spad::steady(dead, constant(light[0] * STEPS as f64), 1.0 / STEPS as f64);
     let bins = light.chunks(STEPS).map(|steps| {
@@ -170,7 +170,7 @@ fn by_sums(dead: &Dead, light: &[f64]) -> Vec<Seen> {
         steps
             .iter()
             .for_each(|&photons| spad.step(constant(photons)));
-        Seen {
+        BinAvalanches {
             fired: spad.fired.value,
             by_crosstalk: spad.by_crosstalk.value,
             odd: spad.parity.as_ref().map_or(spad.fired.value, |parity| {

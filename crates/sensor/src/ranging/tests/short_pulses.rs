@@ -55,8 +55,8 @@ fn bounds_hold_for_pulses_of_any_length_and_light() {
                 let light =
                     format!("{fwhm_ns} ns, {photons} photons +- {half_depth}, {background_hz} Hz");
                 let ranged = ranged(fwhm_ns, photons, background_hz, half_depth);
-                let rms = |of: &dyn Fn(&(f64, f64)) -> f64| {
-                    let squares = ranged.iter().map(|pair| of(pair).powi(2));
+                let rms = |member: &dyn Fn(&(f64, f64)) -> f64| {
+                    let squares = ranged.iter().map(|pair| member(pair).powi(2));
                     (squares.sum::<f64>() / ranged.len() as f64).sqrt()
                 };
                 let (error, bound) = (rms(&|pair| pair.0), rms(&|pair| pair.1));

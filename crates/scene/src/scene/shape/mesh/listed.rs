@@ -18,7 +18,7 @@ const FOLDED: f64 = 1e-3;
 
 /// Triangles with their corners.
 #[derive(Default)]
-pub(super) struct Listed {
+pub(super) struct TriangleList {
     /// Corners: x right, y down, z forward.
     pub(super) corners: Vec<[f64; 3]>,
     /// Places among the corners.
@@ -31,10 +31,10 @@ pub(super) struct Listed {
 #[derive(Debug)]
 pub(super) struct CrossedFace(pub(super) [f64; 3]);
 
-impl Listed {
+impl TriangleList {
     /// The triangles of all objects of a file.
     pub(super) fn of_models(models: Vec<tobj::Model>) -> Result<Self, CrossedFace> {
-        let mut all = Listed::default();
+        let mut all = TriangleList::default();
         let is_textured = (models.iter())
             .all(|model| model.mesh.texcoord_indices.len() == model.mesh.indices.len());
         for tobj::Model { mesh: read, .. } in models {

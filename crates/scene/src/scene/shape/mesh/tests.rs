@@ -43,9 +43,16 @@ fn ball(rings: usize, radius: f64) -> String {
             corners.push([radius * x * down, radius * cross, radius * z * down]);
         }
     }
-    let at = move |ring: usize, column: usize| ring * columns + column % columns;
+    let corner = move |ring: usize, column: usize| ring * columns + column % columns;
     let faces = (0..rings).flat_map(move |r| {
-        (0..columns).map(move |c| vec![at(r, c), at(r, c + 1), at(r + 1, c + 1), at(r + 1, c)])
+        (0..columns).map(move |c| {
+            vec![
+                corner(r, c),
+                corner(r, c + 1),
+                corner(r + 1, c + 1),
+                corner(r + 1, c),
+            ]
+        })
     });
     obj_of(&corners, faces)
 }
@@ -119,7 +126,7 @@ proptest! {
         for (x, y) in at {
             // The file's y is up.
             let ray = Ray { origin: DVec3::new(x, -y, 0.0), direction: DVec3::Z };
-            prop_assert_eq!(mesh.meet(&ray).is_some(), is_within(&outline, [x, y]));
+            prop_assert_eq!(mesh.intersect(&ray).is_some(), is_within(&outline, [x, y]));
         }
     }
 }
@@ -165,12 +172,12 @@ fn a_cube_of_quadrangles_is_a_box() {
             f64::from(number / 50) / 40.0 - 0.5,
         );
         let ray = Ray::new(DVec3::ZERO, DVec3::new(0.9 * x, 0.5 * y, 1.0));
-        match (mesh.meet(&ray), cuboid.meet(&ray)) {
+        match (mesh.intersect(&ray), cuboid.intersect(&ray)) {
             (Some(a), Some(b)) => {
                 assert!((a.range_m - b.range_m).abs() < 1e-5);
                 let normals = [
-                    mesh.normal_at(ray.at(a.range_m), a.part),
-                    cuboid.normal_at(ray.at(b.range_m), b.part),
+                    mesh.normal_at(ray.point(a.range_m), a.part),
+                    cuboid.normal_at(ray.point(b.range_m), b.part),
                 ];
                 assert!(normals[0].dot(normals[1]).abs() > 1.0 - 1e-6);
             }
@@ -206,7 +213,7 @@ fn a_fine_ball_of_triangles_is_a_sphere() {
             continue;
         };
         // Facets lie below the sphere by up to 2 m · (1 - cos(pi/400)) along rings and as much along columns.
-        let below = 2.0 - ray.at(a).distance(centre_m);
+        let below = 2.0 - ray.point(a).distance(centre_m);
         assert!((0.0..1.3e-4).contains(&below) && a >= b, "{below} {a} {b}");
     }
 }
@@ -218,8 +225,8 @@ fn texture_coordinates_come_from_the_file() {
     let mesh = read(text).unwrap();
     for (x, y) in [(0.25, 0.125), (0.75, 0.875), (0.5, 0.5)] {
         let ray = Ray::new(DVec3::new(x, y, -3.0), DVec3::Z);
-        let Meeting { range_m, part } = mesh.meet(&ray).unwrap();
-        let (u, v) = mesh.on_surface(ray.at(range_m), part);
+        let Meeting { range_m, part } = mesh.intersect(&ray).unwrap();
+        let (u, v) = mesh.on_surface(ray.point(range_m), part);
         assert!(
             (u - 2.0 * x).abs() < 1e-6 && (v - y).abs() < 1e-6,
             "{u} {v}"
@@ -273,7 +280,7 @@ proptest! {
             let away = if number % 4 == 0 { DVec3::new(y, z, x) * 0.3 } else { DVec3::new(y, z, x).normalize() * far };
             let origin = mesh.middle + away;
             let ray = Ray::new(origin, aim - origin);
-            let found = mesh.meet(&ray).map(|m| (m.range_m, mesh.numbers[m.part as usize]));
+            let found = mesh.intersect(&ray).map(|m| (m.range_m, mesh.numbers[m.part as usize]));
             prop_assert_eq!(found, meet_all(&mesh, &ray));
         }
     }
@@ -300,7 +307,7 @@ fn corners_far_from_the_origin_keep_their_millimetres() {
         origin,
         direction: DVec3::Z,
     };
-    let met = mesh.meet(&ray).unwrap();
+    let met = mesh.intersect(&ray).unwrap();
     assert!((met.range_m - 10.0).abs() < 1e-6, "{}", met.range_m);
     assert_eq!(mesh.numbers[met.part as usize], 1);
 }

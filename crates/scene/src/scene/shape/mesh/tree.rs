@@ -66,7 +66,7 @@ struct Ahead {
 
 impl Tree {
     /// Over triangles with these bounds, and the order in which it keeps them.
-    pub(super) fn over(bounds: &[Bounds]) -> (Self, Vec<u32>) {
+    pub(super) fn build(bounds: &[Bounds]) -> (Self, Vec<u32>) {
         let params = BvhBuildParams::fast_build();
         let narrow = build_bvh2(bounds, params, &mut std::time::Duration::default());
         let mut nodes = vec![EMPTY];
@@ -175,15 +175,15 @@ impl Tree {
 
 /// Up to four nodes that together are what `node` and those under it are, none of them twice.
 fn children(tree: &Bvh2, node: u32) -> SmallVec<[u32; 4]> {
-    let of = |node: u32| &tree.nodes[node as usize];
+    let bvh_node = |node: u32| &tree.nodes[node as usize];
     let mut all: SmallVec<[u32; 4]> = SmallVec::from_slice(&[node]);
     while all.len() < 4 {
-        let open = (0..all.len()).filter(|&at| !of(all[at]).is_leaf());
-        let size = |at: usize| of(all[at]).aabb().half_area();
+        let open = (0..all.len()).filter(|&at| !bvh_node(all[at]).is_leaf());
+        let size = |at: usize| bvh_node(all[at]).aabb().half_area();
         let Some(largest) = open.max_by(|&a, &b| size(a).total_cmp(&size(b))) else {
             break;
         };
-        let first = of(all[largest]).first_index;
+        let first = bvh_node(all[largest]).first_index;
         all[largest] = first;
         all.push(first + 1);
     }

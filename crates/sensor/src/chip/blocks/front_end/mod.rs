@@ -18,7 +18,7 @@ use crate::photon::count_bits;
 use crate::units::Time;
 
 pub use pulse_limits::{DeadTimeTooShort, PulseLimits};
-pub use variant::Variant;
+pub use variant::FrontEndVariant;
 use variants::coincidence::Wire;
 pub use variants::summation;
 pub(crate) use variants::summation::TOGGLE;
@@ -26,8 +26,8 @@ pub(super) use variants::xor_tree;
 
 impl FrontEnd {
     /// What other files ask of it.
-    pub(crate) fn row(self) -> &'static Variant {
-        const ROWS: [&Variant; FrontEnd::ALL.len()] = variants::rows!();
+    pub(crate) fn row(self) -> &'static FrontEndVariant {
+        const ROWS: [&FrontEndVariant; FrontEnd::ALL.len()] = variants::rows!();
         ROWS[self as usize]
     }
 
@@ -67,26 +67,26 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
 
 /// Reference model of any front end.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Model {
+pub struct FrontEndModel {
     kind: FrontEnd,
     wire: Wire,
-    retiming: summation::Model,
+    retiming: summation::SummationModel,
 }
 
-impl Model {
+impl FrontEndModel {
     /// The front end of a sensor with these delays.
     pub fn new(config: &SensorConfig, timing: &ChipTiming) -> Self {
         let together = config.spads_of_an_event();
-        Model {
+        FrontEndModel {
             kind: config.front_end,
             wire: Wire::new(together, timing.pulses.shaped.unwrap_or_default()),
-            retiming: summation::Model::default(),
+            retiming: summation::SummationModel::default(),
         }
     }
 
     /// A pulse of one SPAD; pulses come in the order of time.
     pub fn pulse(&mut self, time: Time, spad: u8) {
-        let Variant { joins, shapes, .. } = *self.kind.row();
+        let FrontEndVariant { joins, shapes, .. } = *self.kind.row();
         if !joins {
             self.retiming.pulse(spad);
         } else if !shapes || self.wire.pulse(time) {

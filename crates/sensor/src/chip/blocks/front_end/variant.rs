@@ -7,7 +7,7 @@ use crate::netlist::{Module, ModuleBuilder, Net};
 
 /// What other files ask of a front end.
 #[derive(Debug)]
-pub struct Variant {
+pub struct FrontEndVariant {
     /// Its circuit; ports as in [`super::circuit`].
     pub circuit: fn(&SensorConfig) -> Arc<Module>,
     /// Whether all SPADs share one line, whose edges depend on more than one SPAD. Only gates run such a front end.

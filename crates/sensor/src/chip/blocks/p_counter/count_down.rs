@@ -20,7 +20,7 @@ pub(in crate::chip) const SHORTEST_PAUSE: Time = Time::from_ns(500);
 
 /// What counting down depends on besides the netlist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(in crate::chip) struct Expected {
+pub(in crate::chip) struct CountDownSetup {
     /// COUNTER_RESET brings the start value back.
     pub has_memory: bool,
     /// Whether the counter waits after LOCAL_STOP.
@@ -29,10 +29,10 @@ pub(in crate::chip) struct Expected {
     pub step_periods: usize,
 }
 
-impl Expected {
+impl CountDownSetup {
     /// What a sensor's P-counter is expected to do.
     pub(in crate::chip) fn of_sensor(config: &SensorConfig) -> Self {
-        Expected {
+        CountDownSetup {
             has_memory: config.p_counter.row().has_memory,
             after_borrow: config.after_borrow,
             step_periods: config.step_periods,
@@ -42,7 +42,7 @@ impl Expected {
 
 /// What one value of COUNTER_INIT does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::chip) struct Counted {
+pub(in crate::chip) struct CountDownResult {
     /// Whether LOCAL_STOP is high after the reset.
     pub starts_high: bool,
     /// Edges of COUNTER_CLK that raise LOCAL_STOP, the first one being 0: the first two.
@@ -51,9 +51,9 @@ pub(in crate::chip) struct Counted {
     pub delay: Option<Time>,
 }
 
-impl Counted {
+impl CountDownResult {
     /// A LOCAL_STOP that stays low.
-    pub(in crate::chip) const NEVER: Self = Counted {
+    pub(in crate::chip) const NEVER: Self = CountDownResult {
         starts_high: false,
         rises: [None; 2],
         delay: None,
@@ -66,7 +66,7 @@ pub(in crate::chip) struct CountDown<'n> {
     probes: &'n Probes,
     kernel: LaneKernel,
     codes: &'n [u16],
-    expected: Expected,
+    expected: CountDownSetup,
     local_stop: NetId,
     pause: Time,
     now: Time,
@@ -99,10 +99,10 @@ impl<'n> CountDown<'n> {
         (netlist, probes): (&'n Netlist, &'n Probes),
         timing: &Timing,
         codes: &'n [u16],
-        expected: Expected,
+        expected: CountDownSetup,
     ) -> Self {
         let slowest = |cell: usize| {
-            let arcs = timing.of(cell).as_flattened().iter();
+            let arcs = timing.cell_delays(cell).as_flattened().iter();
             arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
                 .max()
                 .unwrap_or(0)
@@ -154,7 +154,7 @@ impl<'n> CountDown<'n> {
     ///
     /// # Errors
     /// A LOCAL_STOP that is unknown or not one clean edge, or a reset that does not bring a value back.
-    pub(in crate::chip) fn measure(mut self, times: usize) -> Result<Vec<Counted>, Uneven> {
+    pub(in crate::chip) fn measure(mut self, times: usize) -> Result<Vec<CountDownResult>, Uneven> {
         let inputs: Vec<_> = self
             .netlist
             .inputs()
@@ -175,7 +175,7 @@ impl<'n> CountDown<'n> {
             let word = lanes.fold(0, |word, (lane, code)| {
                 word | u64::from(code >> bit & 1) << lane
             });
-            (net, Lanes::known(word))
+            (net, Lanes::from_bits(word))
         });
         let bits: Vec<_> = bits.collect();
         self.drive(&bits, u64::MAX);
@@ -192,7 +192,7 @@ impl<'n> CountDown<'n> {
             self.set(Probe::CounterReset, false);
             let again = self.count()?;
             let mut lanes = counted.iter().zip(&again).zip(self.codes);
-            let differ = |one: &Counted, other: &Counted| {
+            let differ = |one: &CountDownResult, other: &CountDownResult| {
                 (one.starts_high, one.rises) != (other.starts_high, other.rises)
             };
             if let Some((_, &code)) = lanes.find(|((one, other), _)| differ(one, other)) {
@@ -203,7 +203,7 @@ impl<'n> CountDown<'n> {
     }
 
     /// Clocks the counter until LOCAL_STOP has risen, or come round where it wraps, as the timing block lets it.
-    fn count(&mut self) -> Result<Vec<Counted>, Uneven> {
+    fn count(&mut self) -> Result<Vec<CountDownResult>, Uneven> {
         let holds = self.expected.after_borrow == AfterBorrow::Hold;
         let clk = self.probes.net(Probe::CounterClk);
         let bits = self.probes.bus(Probe::CounterInit).len();
@@ -213,10 +213,10 @@ impl<'n> CountDown<'n> {
         let code = |lanes: u64| self.codes[lanes.trailing_zeros() as usize];
         let mut high = self.kernel.value(self.local_stop).one;
         let starts_high = high;
-        let mut counted: Vec<Counted> = (0..self.codes.len())
-            .map(|lane| Counted {
+        let mut counted: Vec<CountDownResult> = (0..self.codes.len())
+            .map(|lane| CountDownResult {
                 starts_high: starts_high >> lane & 1 == 1,
-                ..Counted::NEVER
+                ..CountDownResult::NEVER
             })
             .collect();
         let mut awaited = if holds { used & !high } else { used };
@@ -261,5 +261,5 @@ impl<'n> CountDown<'n> {
 }
 
 fn all(value: bool) -> Lanes {
-    Lanes::known(if value { u64::MAX } else { 0 })
+    Lanes::from_bits(if value { u64::MAX } else { 0 })
 }

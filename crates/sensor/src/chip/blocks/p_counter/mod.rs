@@ -7,7 +7,7 @@
 //!   COUNTER_RESET (each STOP) ────────────►           after the reset
 //! ```
 //!
-//! All have the same pins, so that the macropixel does not care. [`PCounter`] lists them, each with a [`Variant`]: what other
+//! All have the same pins, so that the macropixel does not care. [`PCounter`] lists them, each with a [`PCounterVariant`]: what other
 //! files ask of it, from the variant's own file. Two questions the thesis leaves open are keys of
 //! the sensor file. [`Tap`]: it ties LOCAL_STOP to the counter's most significant bit *and* claims 2ⁿ window steps,
 //! but a start value of 2ⁿ⁻¹ or more has that bit high from the reset on. The default, `borrow`, is a stage more,
@@ -29,12 +29,12 @@ use crate::chip::own_block::block::OwnBlock;
 use crate::netlist::Module;
 
 pub(crate) use pins::memory;
-pub use variant::{Counter, DownCounter, Variant};
+pub use variant::{Counter, DownCounter, PCounterVariant};
 
 impl PCounter {
     /// What other files ask of it.
-    pub fn row(self) -> &'static Variant {
-        const ROWS: [&Variant; PCounter::ALL.len()] = variants::rows!();
+    pub fn row(self) -> &'static PCounterVariant {
+        const ROWS: [&PCounterVariant; PCounter::ALL.len()] = variants::rows!();
         ROWS[self as usize]
     }
 
@@ -79,21 +79,21 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
 
 /// Reference model of a P-counter together with what the timing block makes of its LOCAL_STOP.
 #[derive(Debug)]
-pub struct Model {
-    variant: &'static Variant,
-    divider: step_divider::Model,
+pub struct PCounterModel {
+    variant: &'static PCounterVariant,
+    divider: step_divider::StepDividerModel,
     counter: Box<dyn Counter>,
     after_borrow: AfterBorrow,
     bits: usize,
 }
 
-impl Model {
+impl PCounterModel {
     /// The P-counter of this sensor, just reset (or, without memory, just loaded) with `start`.
     pub fn new(config: &SensorConfig, start: u16) -> Self {
         let variant = config.p_counter.row();
-        Model {
+        PCounterModel {
             variant,
-            divider: step_divider::Model::new(config.step_bits()),
+            divider: step_divider::StepDividerModel::new(config.step_bits()),
             counter: (variant.model)(config, start.into()),
             after_borrow: config.after_borrow,
             bits: config.counter_bits,
@@ -147,7 +147,7 @@ pub struct Rises {
 impl Rises {
     /// When a sensor's LOCAL_STOP rises from this start value; `None` where it is high from the reset on and blocks
     /// the counter for good.
-    pub fn of(config: &SensorConfig, start: u16) -> Option<Self> {
+    pub fn from_start_value(config: &SensorConfig, start: u16) -> Option<Self> {
         if let Some(law) = config.counter_law() {
             return law.rises(start);
         }
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn local_stop_comes_one_edge_after_zero() {
-        let mut model = Model::new(&SensorConfig::default(), 5);
+        let mut model = PCounterModel::new(&SensorConfig::default(), 5);
         let rises: Vec<bool> = (0..10).map(|_| model.clock()).collect();
         assert_eq!(rises.iter().position(|&r| r), Some(5));
         assert_eq!(rises.iter().filter(|&&r| r).count(), 1);
@@ -226,10 +226,10 @@ mod tests {
             let config = SensorConfig { counter_bits, step_periods: 1 << step, p_counter, tap, after_borrow, ..SensorConfig::default() };
             prop_assume!(config.check().is_ok());
             let start = start & config.largest_start();
-            let mut model = Model::new(&config, start);
+            let mut model = PCounterModel::new(&config, start);
             prop_assert_eq!(model.local_stop(), starts_high(&config, start));
             let found: Vec<i64> = (0..1000).filter(|_| model.clock()).collect();
-            let expected: Vec<i64> = match Rises::of(&config, start) {
+            let expected: Vec<i64> = match Rises::from_start_value(&config, start) {
                 None => vec![],
                 Some(Rises { first, every: None }) => vec![first],
                 Some(Rises { first, every: Some(every) }) => (first..1000).step_by(every as usize).collect(),

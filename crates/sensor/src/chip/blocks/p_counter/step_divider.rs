@@ -38,15 +38,15 @@ pub(super) fn place(m: &mut ModuleBuilder, clk: Net, reset: Net, bits: u32) -> N
 
 /// Reference model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Model {
+pub(super) struct StepDividerModel {
     bits: u32,
     count: u32,
 }
 
-impl Model {
+impl StepDividerModel {
     /// A divider by 2ᵏ, k = `bits`, just reset.
     pub(super) fn new(bits: u32) -> Self {
-        Model { bits, count: 0 }
+        StepDividerModel { bits, count: 0 }
     }
 
     /// COUNTER_RESET.

@@ -7,7 +7,7 @@ use crate::netlist::Module;
 
 /// What other files ask of a variant.
 #[derive(Debug)]
-pub struct Variant {
+pub struct PCounterVariant {
     /// Its circuit; ports as in [`super::circuit`].
     pub circuit: fn(&SensorConfig) -> Arc<Module>,
     /// Its reference model, holding this start value.
@@ -29,14 +29,14 @@ pub struct Variant {
     pub clears_first: bool,
 }
 
-impl Variant {
+impl PCounterVariant {
     /// A down counter with a memory, in plain binary.
     pub(super) const fn down_counter(
         circuit: fn(&SensorConfig) -> Arc<Module>,
         stage: &'static str,
         transistors: u64,
     ) -> Self {
-        Variant {
+        PCounterVariant {
             circuit,
             model: |config, start| {
                 Box::new(DownCounter::new(config.counter_bits, config.tap, start))

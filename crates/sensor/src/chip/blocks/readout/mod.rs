@@ -65,7 +65,7 @@ pub struct ReadoutOrder {
 
 impl ReadoutOrder {
     /// That of a sensor.
-    pub fn of(config: &SensorConfig) -> Self {
+    pub fn new(config: &SensorConfig) -> Self {
         Self::of_array(config, (config.rows, config.cols))
     }
 

@@ -13,14 +13,14 @@ use std::f64::consts::TAU;
 
 /// A row of coupled rings.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct RingRow {
     /// Frequency of each ring alone, Hz.
     pub free_hz: Vec<f64>,
     /// How far a neighbour can pull a ring's frequency, Hz.
     pub pull_hz: f64,
 }
 
-impl Row {
+impl RingRow {
     /// The frequency that they share once they have locked: the mean of their own, Hz.
     pub fn locked_hz(&self) -> f64 {
         self.free_hz.iter().sum::<f64>() / self.free_hz.len() as f64
@@ -37,7 +37,7 @@ impl Row {
     }
 
     /// Mean frequency of each ring, Hz, over the second half of `seconds` from a common start, by Runge and Kutta's method.
-    pub fn run(&self, seconds: f64) -> Vec<f64> {
+    pub fn mean_frequencies_hz(&self, seconds: f64) -> Vec<f64> {
         // The fastest change is that of a ring between two neighbours; phases are taken relative to the mean.
         let mean = self.locked_hz();
         let spread = self.free_hz.iter().map(|hz| (hz - mean).abs());
@@ -101,21 +101,21 @@ mod tests {
             vec![1.0e9, 0.97e9, 1.01e9, 1.05e9, 0.99e9],
         ] {
             let row = |share: f64| {
-                let free = Row {
+                let free = RingRow {
                     free_hz: free_hz.clone(),
                     pull_hz: 0.0,
                 };
-                Row {
+                RingRow {
                     pull_hz: share * free.least_pull_hz(),
                     ..free
                 }
             };
             let locked = row(1.05);
-            let found = locked.run(20e-6);
+            let found = locked.mean_frequencies_hz(20e-6);
             assert!(spread(&found) < 1.0, "{found:?}");
             assert!((found[0] - locked.locked_hz()).abs() < 1.0);
-            assert!(spread(&row(0.95).run(20e-6)) > 1e5);
-            let alone = row(0.0).run(1e-6);
+            assert!(spread(&row(0.95).mean_frequencies_hz(20e-6)) > 1e5);
+            let alone = row(0.0).mean_frequencies_hz(1e-6);
             assert!((alone[1] - free_hz[1]).abs() < 1.0);
         }
     }
@@ -123,11 +123,11 @@ mod tests {
     /// Below its lock, Adler's pair beats at √(Δf² − (2h)²).
     #[test]
     fn two_rings_beat_as_adler_has_it() {
-        let row = Row {
+        let row = RingRow {
             free_hz: vec![1.00e9, 1.02e9],
             pull_hz: 6e6,
         };
-        let found = row.run(200e-6);
+        let found = row.mean_frequencies_hz(200e-6);
         let beat = (20e6f64.powi(2) - 12e6f64.powi(2)).sqrt();
         let off = (found[1] - found[0]) / beat - 1.0;
         assert!(off.abs() < 1e-3, "{off}");

@@ -59,7 +59,7 @@ pub fn model(netlist: &Netlist, timing: &Timing, path: &str) -> Steps {
     };
     let elements = (0..).map_while(element);
     let edges = elements.scan(Time::ZERO, |passed, cell| {
-        *passed += Time::from_fs(timing.of(cell)[0][0].to(Logic::One).into());
+        *passed += Time::from_fs(timing.cell_delays(cell)[0][0].delay_fs(Logic::One).into());
         Some(*passed)
     });
     let steps = Steps::new(edges.collect());

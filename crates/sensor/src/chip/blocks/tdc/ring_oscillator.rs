@@ -50,7 +50,7 @@ pub fn circuit(stages: usize, bits: usize) -> Arc<Module> {
 
 /// Reference model: what its cells' delays make of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Model {
+pub struct RingOscillatorModel {
     /// START → the first fall of RING<0>, less STOP → GATE's fall.
     pub first: Time,
     /// The ring's period.
@@ -61,12 +61,12 @@ pub struct Model {
     pub lag: Time,
 }
 
-impl Model {
+impl RingOscillatorModel {
     /// The ring at `path` (empty: the top) of a netlist with these delays.
     ///
     /// # Panics
     /// When there is no ring.
-    pub fn of(netlist: &Netlist, timing: &Timing, path: &str) -> Self {
+    pub fn from_netlist(netlist: &Netlist, timing: &Timing, path: &str) -> Self {
         let cell = |name: &str| {
             if path.is_empty() {
                 netlist.cell(name)
@@ -76,7 +76,7 @@ impl Model {
         };
         let delay = |name: &str, pin: usize, to| {
             let cell = cell(name).expect("a ring has its cells");
-            Time::from_fs(timing.of(cell)[pin][0].to(to).into())
+            Time::from_fs(timing.cell_delays(cell)[pin][0].delay_fs(to).into())
         };
         let inverters = (1..).map(|stage| format!("ring_{stage}"));
         let inverters = inverters.take_while(|name| cell(name).is_some());
@@ -85,7 +85,7 @@ impl Model {
         // RING<0> falls for as long as it takes GATE's fall to raise it again, and RING<1> must see that. In the very
         // instant of GATE's fall there is none.
         let unseen = delay("ring_1", 0, One) - delay("ring_0", 0, One);
-        Model {
+        RingOscillatorModel {
             opens: delay("gate", 0, One) - delay("stop", 0, Zero),
             lag: unseen.max(Time::from_fs(1)),
             first: to_fall - delay("stop", 0, Zero) - delay("gate", 1, Zero),

@@ -1,6 +1,6 @@
 //! Delays of a P-counter with its timing block.
 
-use super::{MacropixelDelays, MacropixelPaths, Span, changes, earliest, edge, latest};
+use super::{DelaySpan, MacropixelDelays, MacropixelPaths, changes, earliest, edge, latest};
 use crate::chip::Probe;
 use crate::netlist::Edge;
 use crate::units::Time;
@@ -9,15 +9,15 @@ use crate::units::Time;
 #[derive(Debug, Clone)]
 pub struct CounterDelays {
     /// CLK falls → COUNTER_CLK rises.
-    pub counter_clk: Span,
+    pub counter_clk: DelaySpan,
     /// CLK falls → LOCAL_STOP rises. Every stage is taken to toggle, as it does when the counter rolls over.
-    pub local_stop: Span,
+    pub local_stop: DelaySpan,
     /// CLK falls → STROBE rises.
-    pub strobe: Span,
+    pub strobe: DelaySpan,
     /// CLK falls → what freezes the window rises: STROBE, or SAMPLE_CLK before it.
-    pub sample: Span,
+    pub sample: DelaySpan,
     /// CLK falls → LOCAL_STOP → BLOCK rises; none where LOCAL_STOP does not block.
-    pub block: Option<Span>,
+    pub block: Option<DelaySpan>,
     /// BLOCK rises → COUNTER_CLK falls, earliest.
     pub block_to_counter_clk: Option<Time>,
     /// CLK falls → data of the flip-flops that COUNTER_CLK clocks settled, latest.
@@ -38,13 +38,13 @@ pub struct CounterDelays {
     /// none where a memory takes the start value.
     pub load_pulse: Option<Time>,
     /// COUNTER_RESET rises → HIT's reset begins.
-    pub hit_reset: Span,
+    pub hit_reset: DelaySpan,
     /// COUNTER_RESET falls → HIT's reset ends.
-    pub hit_release: Span,
+    pub hit_release: DelaySpan,
     /// COUNTER_RESET rises → HIT has fallen, latest.
     pub hit_falls: Time,
     /// STOP rises → RUN changes → COUNTER_RESET's other cause changes.
-    pub clear: Span,
+    pub clear: DelaySpan,
     /// STOP rises → RUN rises → that cause falls, latest.
     pub clear_falls: Time,
     /// STOP rises → RUN changes → COUNTER_CLK changes, latest.
@@ -55,7 +55,7 @@ pub struct CounterDelays {
 
 impl CounterDelays {
     /// Measures them; `delays` are those of the same paths.
-    pub(crate) fn of(paths: &MacropixelPaths<'_>, delays: &MacropixelDelays) -> Self {
+    pub(crate) fn measure(paths: &MacropixelPaths<'_>, delays: &MacropixelDelays) -> Self {
         let (circuit, run) = (paths.circuit, delays.run);
         let net = |probe| circuit.probes.net(probe);
         let fall = paths.after_clk(Edge::Fall);

@@ -14,7 +14,7 @@ impl Leveliser<'_> {
     }
 
     /// Where a flip-flop's reset and set are found.
-    fn control_bits(&mut self, cell: &FlatCell) -> Result<[Bit; 2], Unlevelled> {
+    fn control_bits(&mut self, cell: &FlatCell) -> Result<[Bit; 2], LevelisationError> {
         let mut bit = |net: Option<NetId>| net.map_or(Ok((ZERO, false)), |net| self.bit(net));
         Ok([bit(cell.inputs[2])?, bit(cell.inputs[3])?])
     }
@@ -27,7 +27,7 @@ impl Leveliser<'_> {
         cell: &FlatCell,
         mask: u16,
         instant_fs: i64,
-    ) -> Result<(u16, Vec<usize>), Unlevelled> {
+    ) -> Result<(u16, Vec<usize>), LevelisationError> {
         let (mut lanes, mut drafts) = (mask, Vec::new());
         for (control, after_fs) in self.control_bits(cell)?.into_iter().zip(0..) {
             if control == (ZERO, false) {
@@ -50,7 +50,7 @@ impl Leveliser<'_> {
         index: usize,
         mask: Option<u16>,
         arrival_fs: i64,
-    ) -> Result<usize, Unlevelled> {
+    ) -> Result<usize, LevelisationError> {
         let cell = self.survey.netlist.cells()[index];
         let d = cell.input(0);
         let q = cell.output_nets().next().expect("an output is read");
@@ -98,16 +98,16 @@ impl Leveliser<'_> {
         cell: &FlatCell,
         index: usize,
         arrival_fs: i64,
-    ) -> Result<(Code, bool), Unlevelled> {
+    ) -> Result<(Code, bool), LevelisationError> {
         let survey = self.survey;
         let data = cell.input(0);
         let (register, output) = survey.driver[data.index()].expect("a stream net has a driver");
         if !survey.netlist.cells()[register].kind.is_flip_flop() {
-            return Err(Unlevelled::Structure(survey.name(data)));
+            return Err(LevelisationError::Structure(survey.name(data)));
         }
         // Where the flip-flop's clock comes is told by the delay with which it was given its place.
         let to_output = self.longest_delay(index, CLOCK);
-        let of_register = &survey.timing.of(register)[CLOCK][output];
+        let of_register = &survey.timing.cell_delays(register)[CLOCK][output];
         let (rise, fall) = (
             i64::from(of_register.rise_fs),
             i64::from(of_register.fall_fs),
@@ -120,8 +120,8 @@ impl Leveliser<'_> {
         let limit = |limit: DataLimit| {
             let longest = limit
                 .rise
-                .at(self.config.corner)
-                .max(limit.fall.at(self.config.corner));
+                .in_corner_fs(self.config.corner)
+                .max(limit.fall.in_corner_fs(self.config.corner));
             i64::from(longest) + ROUNDING_FS
         };
         let before = self.period_fs - after - (rise - fall).abs();
@@ -149,7 +149,7 @@ impl Leveliser<'_> {
         to: Node,
         arrival: &HashMap<Node, (i64, i64)>,
         gates: &mut HashMap<Node, usize>,
-    ) -> Result<usize, Unlevelled> {
+    ) -> Result<usize, LevelisationError> {
         let cell = self.survey.netlist.cells()[index];
         let times = Edge::BOTH.map(|edge| arrival.get(&(to.0, edge)).map(|window| window.1));
         let is_quiet = |from: i64, until: i64| {
@@ -193,7 +193,7 @@ impl Leveliser<'_> {
     pub(super) fn function(
         &mut self,
         cell: &FlatCell,
-    ) -> Result<(Code, [u16; 4], [u64; 5]), Unlevelled> {
+    ) -> Result<(Code, [u16; 4], [u64; 5]), LevelisationError> {
         let relevant = self.survey.relevant(cell);
         let pins: Vec<usize> = (0..cell.kind.inputs().len())
             .filter(|&p| relevant[p])
@@ -249,7 +249,7 @@ impl Leveliser<'_> {
                 action(Code::Mux, &[a, b, s], &[ia, ib, is], false)
             }
             _ => {
-                return Err(Unlevelled::Structure(
+                return Err(LevelisationError::Structure(
                     self.survey
                         .name(cell.outputs[0].expect("a gate that is read")),
                 ));

@@ -69,13 +69,13 @@ impl Leveliser<'_> {
         let outputs = self.survey.netlist.cells()[arc.cell].outputs;
         let output = outputs.iter().position(|&net| net == Some(to.0));
         let output = output.expect("an arc leads to an output");
-        i64::from(self.survey.timing.of(arc.cell)[arc.pin][output].to(to.1.level()))
+        i64::from(self.survey.timing.cell_delays(arc.cell)[arc.pin][output].delay_fs(to.1.level()))
     }
 
     /// The longest delay to any output: a draft of a flip-flop stands for what both of them do.
     pub(super) fn longest_delay(&self, cell: usize, pin: usize) -> i64 {
         let leaf = &self.survey.netlist.cells()[cell];
-        let arcs = &self.survey.timing.of(cell)[pin];
+        let arcs = &self.survey.timing.cell_delays(cell)[pin];
         let connected = arcs
             .iter()
             .zip(leaf.outputs)
@@ -113,7 +113,7 @@ impl Leveliser<'_> {
     }
 
     /// Drafts the actions of one cause; the first of them sets the shared net.
-    pub(super) fn follow(&mut self, reach: &Reach) -> Result<usize, Unlevelled> {
+    pub(super) fn follow(&mut self, reach: &Reach) -> Result<usize, LevelisationError> {
         let cause = reach.cause;
         let (place, _) = self.bit(cause.net)?;
         let set = Action::new(Code::Set(cause.value), place);
@@ -178,7 +178,7 @@ impl Leveliser<'_> {
         arc: &Arc,
         clock: &mut ClockMasks,
         instant_fs: i64,
-    ) -> Result<usize, Unlevelled> {
+    ) -> Result<usize, LevelisationError> {
         let cell = self.survey.netlist.cells()[arc.cell];
         let (early, late) = reach.arrival[&node];
         let delay = self.longest_delay(arc.cell, arc.pin);
@@ -199,7 +199,9 @@ impl Leveliser<'_> {
         } else if early != late {
             return Err(self.ambiguous(node.0, (early, late)));
         } else if is_released {
-            return Err(Unlevelled::Clear(self.survey.netlist.cell_path(arc.cell)));
+            return Err(LevelisationError::Clear(
+                self.survey.netlist.cell_path(arc.cell),
+            ));
         } else {
             None
         };

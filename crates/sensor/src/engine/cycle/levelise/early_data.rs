@@ -61,7 +61,7 @@ impl Leveliser<'_> {
         reach: &Reach,
         cell: usize,
         (clock_fs, output_fs): (i64, i64),
-    ) -> Result<(), Unlevelled> {
+    ) -> Result<(), LevelisationError> {
         let leaf = &self.survey.netlist.cells()[cell];
         let data = leaf.input(0);
         if leaf.outputs.contains(&Some(data)) || self.survey.class(data) == Class::Stream {

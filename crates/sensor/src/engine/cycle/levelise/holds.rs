@@ -87,7 +87,7 @@ impl Leveliser<'_> {
     ///
     /// # Errors
     /// When the cause is a reset, or set, that is too short for its own effects.
-    pub(super) fn reach(&self, cause: Cause) -> Result<Reach, Unlevelled> {
+    pub(super) fn reach(&self, cause: Cause) -> Result<Reach, LevelisationError> {
         let cells = self.survey.netlist.cells();
         let mut held = self.flip_flops();
         held.retain(|&cell| self.hold_fs(cause, cell) > 0);
@@ -99,13 +99,16 @@ impl Leveliser<'_> {
                 let edge = (cells[cell].input(CLOCK), Edge::Rise);
                 let removal = self.cell_library.checks(cells[cell].kind).removal;
                 reach.arrival.get(&edge).is_none_or(|&(_, late)| {
-                    late + i64::from(removal.at(self.config.corner)) < self.hold_fs(cause, cell)
+                    late + i64::from(removal.in_corner_fs(self.config.corner))
+                        < self.hold_fs(cause, cell)
                 })
             });
             let mut released = reach.held.difference(&held);
             let is_own = |cell: &&usize| Self::controls_of(&cells[**cell]).any(|n| n == cause.net);
             if let Some(&cell) = released.find(|cell| cause.value && is_own(cell)) {
-                return Err(Unlevelled::Clear(self.survey.netlist.cell_path(cell)));
+                return Err(LevelisationError::Clear(
+                    self.survey.netlist.cell_path(cell),
+                ));
             }
             if held.len() == reach.held.len() {
                 return Ok(reach);
@@ -118,7 +121,7 @@ impl Leveliser<'_> {
     ///
     /// # Errors
     /// When paths of different length lead there.
-    pub(super) fn find_releases(&mut self, reaches: &[Reach]) -> Result<(), Unlevelled> {
+    pub(super) fn find_releases(&mut self, reaches: &[Reach]) -> Result<(), LevelisationError> {
         let nets = self.controls();
         for reach in reaches {
             for &(net, edge) in &reach.order {
@@ -164,8 +167,8 @@ impl Leveliser<'_> {
         &self,
         net: NetId,
         (shortest_fs, longest_fs): (i64, i64),
-    ) -> Unlevelled {
-        Unlevelled::Ambiguous {
+    ) -> LevelisationError {
+        LevelisationError::Ambiguous {
             net: self.survey.name(net),
             shortest_fs,
             longest_fs,

@@ -73,7 +73,12 @@ pub(super) struct Beginning {
 
 impl Beginning {
     /// That of the block which is running at a time in or before `laser_cycle`.
-    fn at(time: Time, laser_cycle: u32, stream: &PhotonStream, light: &PixelStream<'_>) -> Self {
+    fn from_time(
+        time: Time,
+        laser_cycle: u32,
+        stream: &PhotonStream,
+        light: &PixelStream<'_>,
+    ) -> Self {
         let ends_fs = stream.ends_fs();
         let first = |cycle| stream.cycle_start(cycle) + Time::from_fs(ends_fs.start);
         let mut cycle = laser_cycle;
@@ -158,7 +163,7 @@ impl Counting<'_> {
     fn first_look_back(&self, pixel: &Pixel<'_>) -> Time {
         let config = self.stream.config();
         let dead_time = config.spads.dead_time;
-        let plain = pixel.parts.iter().filter(|part| !part.breeds());
+        let plain = pixel.parts.iter().filter(|part| !part.has_secondaries());
         // The rate near the window counts; ten dead times before it are near.
         let (first_fs, dead_fs) = (pixel.sight.first_fs, dead_time.as_fs());
         let within_fs = first_fs - 10 * dead_fs..pixel.sight.until_fs;
@@ -181,7 +186,7 @@ impl Counting<'_> {
     /// Counts the window of one laser cycle.
     pub(super) fn count_bright_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
         let window = self.window(pixel.sight, laser_cycle);
-        let (wanted_from, until) = (window.wanted_from(), window.until());
+        let (wanted_from, until) = (window.wanted_from(), window.end());
         let mut back = pixel.look_back;
         let near = std::mem::take(&mut pixel.near);
         let drawn = loop {
@@ -190,7 +195,8 @@ impl Counting<'_> {
             let parts = pixel.parts;
             let is_drawn = |part: usize| back > pixel.look_back || near.contains(&part);
             let of_kind = |breeds: bool| {
-                (0..parts.len()).filter(move |&n| parts[n].breeds() == breeds && is_drawn(n))
+                (0..parts.len())
+                    .filter(move |&n| parts[n].has_secondaries() == breeds && is_drawn(n))
             };
             for part in of_kind(true) {
                 self.push_breeding(pixel, part, begin, &window);
@@ -210,11 +216,15 @@ impl Counting<'_> {
             }
             self.events.clear();
             let are_apart = breeding_photons.is_empty() && echoes.is_empty();
-            if are_apart && self.rows.put(pixel.light, &self.photons, known_from, until) {
+            if are_apart
+                && self
+                    .rows
+                    .sort_in(pixel.light, &self.photons, known_from, until)
+            {
                 let mut ready = [Time::from_fs(-1); MOST_SPADS];
                 let before = begin.time.is_none().then_some(&mut ready[..]);
                 let (rows, events) = (&self.rows, &mut self.events);
-                let known = rows.run(pixel.light, known_from, before, wanted_from, events);
+                let known = rows.append_edges(pixel.light, known_from, before, wanted_from, events);
                 if known.is_ok() {
                     break self.photons.len() as u64;
                 }
@@ -228,7 +238,7 @@ impl Counting<'_> {
             let mut avalanches = pixel.light.avalanches(begin.time, earlier.copied());
             let (photons, events) = (&self.photons, &mut self.events);
             let seen = Some(&mut echoes).filter(|echoes| !echoes.is_empty());
-            let known = avalanches.run(photons, seen, until, wanted_from, events);
+            let known = avalanches.append_edges(photons, seen, until, wanted_from, events);
             if known.is_ok() {
                 break self.photons.len() as u64 + echoes.drawn;
             }
@@ -267,7 +277,7 @@ impl Counting<'_> {
         let echo_from = Time::from_fs(pixel.light.echo_fs().start);
         let mut from = from.max(Time::ZERO);
         loop {
-            let begin = Beginning::at(from, window.laser_cycle, self.stream, pixel.light);
+            let begin = Beginning::from_time(from, window.laser_cycle, self.stream, pixel.light);
             let Some(known_from) = begin.time else {
                 return begin;
             };
@@ -293,7 +303,7 @@ impl Counting<'_> {
     ) {
         let since = begin.time.map_or(begin, |time| {
             let time = time - self.stream.config().spads.reach();
-            Beginning::at(time, window.laser_cycle, self.stream, &pixel.parts[part])
+            Beginning::from_time(time, window.laser_cycle, self.stream, &pixel.parts[part])
         });
         self.push_photons(pixel, part, since, window);
     }
@@ -307,7 +317,7 @@ impl Counting<'_> {
         window: &CycleWindow<'_>,
     ) {
         let light = &pixel.parts[part];
-        let (laser_cycles, until) = (self.stream.config().laser_cycles, window.until());
+        let (laser_cycles, until) = (self.stream.config().laser_cycles, window.end());
         // Of light that changes from laser cycle to laser cycle most layers are dark.
         if light.has_background_in(&(begin.cycle..window.laser_cycle + 2)) {
             let (mut cycle, mut block) = (begin.cycle, begin.block);
@@ -325,10 +335,11 @@ impl Counting<'_> {
         }
         let from = begin.time.unwrap_or(Time::ZERO);
         // What breeds is asked for before `from`, too.
-        let is_wanted =
-            |photon: &&Photon| (light.breeds() || photon.time >= from) && photon.time < until;
+        let is_wanted = |photon: &&Photon| {
+            (light.has_secondaries() || photon.time >= from) && photon.time < until
+        };
         for cycle in self.echoes(light, from, window) {
-            let echo = self.listed[part].of(light, cycle).iter();
+            let echo = self.listed[part].photons(light, cycle).iter();
             self.photons.extend(echo.filter(is_wanted));
         }
     }

@@ -24,7 +24,7 @@ impl CycleWindow<'_> {
     }
 
     /// When the last bin is over for certain.
-    pub(super) fn until(&self) -> Time {
+    pub(super) fn end(&self) -> Time {
         self.start + Time::from_fs(self.sight.until_fs)
     }
 

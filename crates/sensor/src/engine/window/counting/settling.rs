@@ -15,12 +15,12 @@ use smallvec::SmallVec;
 use super::{Counting, Pixel, in_draw};
 use crate::engine::window::codes::{Code, SPAD_MARKS};
 use crate::engine::window::tables::Special;
-use crate::photon::{Group, Photon};
+use crate::photon::{CycleGroup, Photon};
 use crate::units::Time;
 
 impl Counting<'_> {
     /// Settles the cycle of a special photon.
-    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, special: Special, group: Group) {
+    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, special: Special, group: CycleGroup) {
         let Special { photon, shared, .. } = special;
         let code = self.codes.codes()[photon];
         let is_settled = special.is_only
@@ -75,8 +75,8 @@ impl Counting<'_> {
 
     /// The last photon of the same cycle before this one that is like that.
     fn find_before(&self, photon: usize, is_like: impl Fn(Code) -> bool) -> Option<(usize, Code)> {
-        let before = std::iter::successors(self.tables.before(photon), |&photon| {
-            self.tables.before(photon)
+        let before = std::iter::successors(self.tables.previous_photon(photon), |&photon| {
+            self.tables.previous_photon(photon)
         });
         before
             .map(|photon| (photon, self.codes.codes()[photon]))
@@ -98,7 +98,7 @@ impl Counting<'_> {
             }
             once |= spad;
             self.together.push((photon, code));
-            next = self.tables.before(photon);
+            next = self.tables.previous_photon(photon);
         }
         let work = pixel.work;
         let mut left = several;
@@ -109,7 +109,7 @@ impl Counting<'_> {
                 // Photons that cause others did not matter to the window so far, but may when it is looked back.
                 pixel.work = work;
                 self.fired[..=pixel.hits.len()].fill(0);
-                let photons = self.breeding.of(laser_cycle..laser_cycle + 1).iter();
+                let photons = self.breeding.photons(laser_cycle..laser_cycle + 1).iter();
                 self.photons.clear();
                 self.photons.extend(photons.map(|&(_, photon)| photon));
                 self.take_cycle(pixel, Some(last), laser_cycle);
@@ -124,17 +124,17 @@ impl Counting<'_> {
         }
         if is_doubtful {
             for row in 0..=pixel.hits.len() {
-                self.tell(pixel, row);
+                self.count_fired(pixel, row);
             }
         }
         for index in 0..self.together.len() {
             let row = self.together[index].1.row();
-            self.tell(pixel, row);
+            self.count_fired(pixel, row);
         }
     }
 
     /// Adds what fired in a CLK period to its bin.
-    fn tell(&mut self, pixel: &mut Pixel<'_>, row: usize) {
+    fn count_fired(&mut self, pixel: &mut Pixel<'_>, row: usize) {
         let spads = std::mem::take(&mut self.fired[row]);
         self.fire(pixel, row, spads);
     }

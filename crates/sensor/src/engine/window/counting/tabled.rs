@@ -11,12 +11,12 @@
 
 use std::cell::Cell;
 
-use super::{Counting, CycleWindow, Drawn, Pixel};
-use crate::engine::window::echo_rows::Passed;
+use super::{Counting, CycleWindow, GroupDraws, Pixel};
+use crate::engine::window::echo_rows::PassedEdges;
 use crate::engine::window::row_ranks::RowRanks;
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::engine::window::table::{Layout, Places, Table, WORD};
-use crate::photon::{Draw, Group, PER_BLOCK, Photon, PixelStream, Place, TIME_BITS};
+use crate::photon::{CycleGroup, Draw, GroupPlace, PER_BLOCK, Photon, PixelStream, TIME_BITS};
 use crate::units::Time;
 
 mod doubt;
@@ -26,12 +26,12 @@ const STEPS: u32 = 1 << TIME_BITS;
 
 /// What is kept from one macropixel to the next.
 #[derive(Debug, Default)]
-pub(super) struct Tabled {
+pub(super) struct TableScratch {
     table: Table,
     /// Of each part of the light.
-    drawn: Vec<Drawn>,
+    drawn: Vec<GroupDraws>,
     echoes: Vec<Option<RowRanks>>,
-    passed: Passed,
+    passed: PassedEdges,
     unknown: Vec<u32>,
     /// Photons that are put one by one: place and time after the start of the window's cycle.
     listed: Vec<(u32, i64)>,
@@ -48,13 +48,13 @@ pub(super) struct Tabled {
 thread_local! {
     /// Those that this thread had last: tables are large, and made anew for every batch of macropixels took 9 % of the instructions
     /// of a frame of 1600 laser cycles.
-    static KEPT: Cell<Option<Box<Tabled>>> = const { Cell::new(None) };
+    static KEPT: Cell<Option<Box<TableScratch>>> = const { Cell::new(None) };
 }
 
 /// A group of laser cycles in a table.
 struct Tabling<'t> {
     layout: &'t Layout,
-    group: Group,
+    group: CycleGroup,
     spad_bits: u32,
     /// Places of the group's laser cycles that belong to the exposure.
     end: u32,
@@ -99,7 +99,7 @@ impl Tabling<'_> {
         light: &PixelStream<'_>,
         draw: &Draw,
         later: u32,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let (slots, places) = (light.slots(), self.places(later));
         let moved_fs = i64::from(later) * counting.stream.cycle_fs;
@@ -139,7 +139,7 @@ impl Tabling<'_> {
                 .collect();
             for words in words {
                 for &word in words {
-                    let place = places.of(word);
+                    let place = places.place(word);
                     if place >= self.end {
                         continue;
                     }
@@ -147,7 +147,7 @@ impl Tabling<'_> {
                     let may = edges.iter().filter(|edge| at >= edge[0]).count();
                     let must = edges.iter().filter(|edge| at >= edge[1]).count();
                     if may == must {
-                        self.put(passed + must, place, kept);
+                        self.put_photon(passed + must, place, kept);
                     } else {
                         let (cycle, _) = self.split(place);
                         let own_fs = slots.time_fs(run.slot, word);
@@ -161,8 +161,8 @@ impl Tabling<'_> {
     }
 
     #[inline]
-    fn put(&mut self, row: usize, place: u32, kept: &mut Tabled) {
-        kept.table.put(row, place);
+    fn put_photon(&mut self, row: usize, place: u32, kept: &mut TableScratch) {
+        kept.table.put_photon(row, place);
         self.seen += u64::from(self.is_in_bins(row));
     }
 
@@ -173,14 +173,14 @@ impl Tabling<'_> {
         pixel: &Pixel<'_>,
         place: u32,
         time_fs: i64,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let row = self.layout.row_of(time_fs).unwrap_or_else(|| {
             let (cycle, _) = self.split(place);
             let window = counting.window(pixel.sight, self.group.first_cycle() + cycle);
             self.exact_row(&window, time_fs)
         });
-        self.put(row, place, kept);
+        self.put_photon(row, place, kept);
     }
 
     /// The row of a photon in the window of a laser cycle.
@@ -204,14 +204,14 @@ impl Tabling<'_> {
         light: &PixelStream<'_>,
         draw: &Draw,
         rows: &RowRanks,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let places = self.places(0);
         let halves = draw.echo().into_iter().zip(draw.echo_photons());
         for (half, (words, photons)) in halves.enumerate() {
             rows.compare(words, &mut kept.passed);
             let high = &words[1][..photons];
-            let Passed { rows, possible, .. } = &kept.passed;
+            let PassedEdges { rows, possible, .. } = &kept.passed;
             let [rows, possible] = [rows, possible].map(|rows| &rows[..photons]);
             let is_twice = self.layout.fires_twice;
             kept.unknown.clear();
@@ -221,7 +221,7 @@ impl Tabling<'_> {
             let seen = rows.iter().zip(possible).zip(high);
             let seen = seen.map(|((row, possible), &word)| {
                 let is_known = (row == possible) & bins.contains(row);
-                u32::from(is_known & (places.of(word) < places.end))
+                u32::from(is_known & (places.place(word) < places.end))
             });
             self.seen += u64::from(seen.sum::<u32>());
             let unknown = std::mem::take(&mut kept.unknown);
@@ -243,7 +243,7 @@ impl Counting<'_> {
     fn moved_fs(&self, laser_cycle: u32, later: u32) -> i64 {
         match later {
             0 => 0,
-            _ => self.before(laser_cycle).as_fs(),
+            _ => self.previous_cycle_length(laser_cycle).as_fs(),
         }
     }
 
@@ -264,7 +264,7 @@ impl Counting<'_> {
         };
         let parts = pixel.parts;
         kept.drawn
-            .resize_with(kept.drawn.len().max(parts.len()), Drawn::default);
+            .resize_with(kept.drawn.len().max(parts.len()), GroupDraws::default);
         kept.drawn
             .iter_mut()
             .for_each(|drawn| drawn.carried.clear());
@@ -309,7 +309,7 @@ impl Counting<'_> {
             pixel.work.pulses += pulses;
             pixel.work.lost_to_dead_time += tabling.seen.saturating_sub(pulses);
             for (part, drawn) in parts.iter().zip(&mut kept.drawn) {
-                if !part.breeds() {
+                if !part.has_secondaries() {
                     drawn.carry(part, group);
                 }
             }
@@ -318,7 +318,12 @@ impl Counting<'_> {
     }
 
     /// Draws the photons of a group and puts them into the table.
-    fn draw_table(&mut self, pixel: &mut Pixel<'_>, tabling: &mut Tabling<'_>, kept: &mut Tabled) {
+    fn draw_table(
+        &mut self,
+        pixel: &mut Pixel<'_>,
+        tabling: &mut Tabling<'_>,
+        kept: &mut TableScratch,
+    ) {
         let (group, parts) = (tabling.group, pixel.parts);
         let cycles = tabling.end >> tabling.spad_bits;
         let places = group.cycles() << tabling.spad_bits;
@@ -333,7 +338,7 @@ impl Counting<'_> {
         for (number, part) in parts.iter().enumerate() {
             let first = group.first_cycle();
             let spans = pixel.spans(part);
-            if part.breeds() {
+            if part.has_secondaries() {
                 let layer = &mut self.layers[number];
                 pixel.work.photons_drawn += layer.draw(part, self.stream, first, spans);
                 let photons = layer.of_group(group).iter();
@@ -349,7 +354,7 @@ impl Counting<'_> {
                 tabling.put_background(self, pixel, part, draw, later, kept);
                 let place = tabling.places(later);
                 let is_kept = draw.runs.is_empty() && draw.echo_photons() == [0; 2];
-                let mut list = |(own, time_fs): (Place, i64)| {
+                let mut list = |(own, time_fs): (GroupPlace, i64)| {
                     let place = u32::from(own) + place.later;
                     let (cycle, _) = tabling.split(place);
                     if place < tabling.end {
@@ -426,7 +431,7 @@ impl Counting<'_> {
         let from = start + Time::from_fs(pixel.sight.plain.from_fs);
         let until = start + Time::from_fs(pixel.sight.until_fs);
         let is_seen = |time: Time| time >= from && time < until;
-        let light = pixel.parts.iter().find(|part| part.breeds());
+        let light = pixel.parts.iter().find(|part| part.has_secondaries());
         is_seen(photon.time)
             || light.is_some_and(|light| light.children(photon).any(|child| is_seen(child.time)))
     }

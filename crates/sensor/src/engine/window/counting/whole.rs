@@ -7,12 +7,12 @@ use super::{Counting, CycleWindow, Pixel};
 use crate::chip::Tdc;
 use crate::engine::window::past::Past;
 use crate::engine::window::sight::{ROUNDING_FS, Spans};
-use crate::photon::{Draw, Group, Photon, PhotonStream, PixelStream, Span};
+use crate::photon::{CycleGroup, Draw, Photon, PhotonStream, PixelStream, Span};
 use crate::units::Time;
 
 impl Counting<'_> {
     /// Counts a group cycle by cycle.
-    pub(super) fn count_whole(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
+    pub(super) fn count_whole(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup, cycles: u32) {
         let mut by_cycle = std::mem::take(&mut self.by_cycle);
         by_cycle.clear();
         by_cycle.extend(self.plain.photons(pixel.light, self.stream, group, cycles));
@@ -51,7 +51,7 @@ impl Counting<'_> {
     fn settle_cycles(
         &mut self,
         pixel: &mut Pixel<'_>,
-        group: Group,
+        group: CycleGroup,
         by_cycle: &mut Vec<(u32, Photon)>,
     ) {
         by_cycle.retain(|(_, photon)| photon.time >= Time::ZERO);
@@ -69,7 +69,7 @@ impl Counting<'_> {
         &self,
         pixel: &Pixel<'_>,
         light: &PixelStream<'_>,
-        group: Group,
+        group: CycleGroup,
         by_cycle: &mut Vec<(u32, Photon)>,
     ) {
         let config = self.stream.config();
@@ -103,7 +103,7 @@ impl Counting<'_> {
                         let photon = Photon::new(
                             self.stream.cycle_start(cycle) + Time::from_fs(time_fs),
                             spad,
-                            light.breeds(),
+                            light.has_secondaries(),
                         );
                         by_cycle.push(((window - of_windows.start) as u32, photon));
                     }
@@ -114,7 +114,7 @@ impl Counting<'_> {
     }
 
     /// Settles the cycles in which an avalanche that breeds may matter. Their photons are in no table afterwards.
-    pub(super) fn count_breeding_cycles(&mut self, pixel: &mut Pixel<'_>, group: Group) {
+    pub(super) fn count_breeding_cycles(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup) {
         let Some(light) = pixel.breeding else {
             return;
         };
@@ -153,7 +153,7 @@ impl Counting<'_> {
                 let time = start + self.time_of(pixel.light, photon, laser_cycle);
                 self.photons.push(Photon::new(time, code.spad(), false));
             }
-            next = self.tables.before(photon);
+            next = self.tables.previous_photon(photon);
         }
     }
 
@@ -207,7 +207,7 @@ impl Counting<'_> {
     /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
     /// rising edges in the window of a laser cycle, and perhaps some before.
     pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, window: &CycleWindow<'_>, spads: u64) {
-        let (wanted_from, until) = (window.wanted_from(), window.until());
+        let (wanted_from, until) = (window.wanted_from(), window.end());
         let past = |part| pixel.spans(part).past(self.stream, window.laser_cycle);
         let mut pasts: SmallVec<[Past<'_>; 2]> = pixel.parts.iter().map(past).collect();
         loop {
@@ -223,7 +223,8 @@ impl Counting<'_> {
             let mut avalanches = pixel.light.avalanches(known_from, breeding.copied());
             self.events.clear();
             let photons = &self.photons[earlier..later.max(earlier)];
-            let known = avalanches.run(photons, None, until, wanted_from, &mut self.events);
+            let known =
+                avalanches.append_edges(photons, None, until, wanted_from, &mut self.events);
             if known.is_ok() {
                 return;
             }
@@ -288,7 +289,7 @@ impl ByWindow {
                 let photon = Photon::new(
                     stream.cycle_start(cycle) + Time::from_fs(time_fs),
                     spad,
-                    light.breeds(),
+                    light.has_secondaries(),
                 );
                 self.photons.push((cycle + later, photon));
             }
@@ -298,13 +299,13 @@ impl ByWindow {
     }
 
     /// Photons for the windows of these laser cycles.
-    pub(super) fn of(&self, windows: std::ops::Range<u32>) -> &[(u32, Photon)] {
+    pub(super) fn photons(&self, windows: std::ops::Range<u32>) -> &[(u32, Photon)] {
         let before = |cycle| self.photons.partition_point(|&(window, _)| window < cycle);
         &self.photons[before(windows.start)..before(windows.end)]
     }
 
     /// Photons for the windows of a group.
-    pub(super) fn of_group(&self, group: Group) -> &[(u32, Photon)] {
-        self.of(group.first_cycle()..group.first_cycle().saturating_add(group.cycles()))
+    pub(super) fn of_group(&self, group: CycleGroup) -> &[(u32, Photon)] {
+        self.photons(group.first_cycle()..group.first_cycle().saturating_add(group.cycles()))
     }
 }

@@ -19,7 +19,7 @@ impl Table {
         adds: &[i64],
     ) -> [i64; 3] {
         let words = &self.words[row * ROW..][..words];
-        let (pulses, visited) = (ones(words), lit(words, spad_bits));
+        let (pulses, visited) = (ones(words), cycles_with_bits(words, spad_bits));
         let step = |spads: usize| adds[spads] - adds[spads - 1];
         // Mostly only the first of them makes a difference, or each the same.
         let last = adds.len() - 1;
@@ -46,7 +46,7 @@ fn ones(words: &[u16]) -> i64 {
 
 /// Laser cycles of a row with any bit.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+popcnt"))]
-fn lit(words: &[u16], spad_bits: u32) -> i64 {
+fn cycles_with_bits(words: &[u16], spad_bits: u32) -> i64 {
     if spad_bits == WORD.ilog2() {
         return i64::from(words.iter().map(|&word| u16::from(word != 0)).sum::<u16>());
     }

@@ -50,7 +50,7 @@ proptest! {
         let row = |time_fs: i64| layout.edges_fs.partition_point(|&edge_fs| edge_fs <= time_fs);
         for &(place, time_fs) in photons.iter().filter(|&&(_, time_fs)| time_fs >= from_fs) {
             prop_assert!(layout.row_of(time_fs).is_none_or(|found| found == row(time_fs)));
-            table.put(row(time_fs), place);
+            table.put_photon(row(time_fs), place);
         }
         table.settle(&layout, words);
         let in_doubt = |table: &Table, place: u32| table.doubt[(place / WORD) as usize] >> (place % WORD) & 1 != 0;
@@ -102,7 +102,7 @@ proptest! {
         let words = (128 / WORD) as usize;
         table.clear(&layout, words);
         for &(place, time_fs) in &photons {
-            table.put(layout.edges_fs.partition_point(|&edge_fs| edge_fs <= time_fs), place);
+            table.put_photon(layout.edges_fs.partition_point(|&edge_fs| edge_fs <= time_fs), place);
         }
         let meeting: Vec<u32> = table.meeting(&layout, words).collect();
         for word in 0..words as u32 {

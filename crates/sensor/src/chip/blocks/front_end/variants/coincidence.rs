@@ -24,11 +24,11 @@ use std::sync::Arc;
 use super::or_tree::shapers;
 use super::summation::retime;
 use crate::chip::blocks::finished;
-use crate::chip::blocks::front_end::variant::{Variant, pins};
+use crate::chip::blocks::front_end::variant::{FrontEndVariant, pins};
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 use crate::units::Time;
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: FrontEndVariant = FrontEndVariant {
     circuit: |config| circuit(config.spads(), config.coincident_spads),
     joins: true,
     shapes: true,

@@ -19,10 +19,10 @@ use std::sync::Arc;
 use super::summation::retime;
 use crate::chip::blocks::finished;
 use crate::chip::blocks::front_end::pulse_shaper;
-use crate::chip::blocks::front_end::variant::{Variant, pins};
+use crate::chip::blocks::front_end::variant::{FrontEndVariant, pins};
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: FrontEndVariant = FrontEndVariant {
     circuit: |config| circuit(config.spads()),
     joins: true,
     shapes: true,

@@ -20,7 +20,7 @@
 use std::sync::Arc;
 
 use crate::chip::blocks::finished;
-use crate::chip::blocks::front_end::variant::Variant;
+use crate::chip::blocks::front_end::variant::FrontEndVariant;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
 /// Name of the cell that a SPAD's pulses toggle.
@@ -29,7 +29,7 @@ pub(crate) const TOGGLE: &str = "toggle";
 /// The instance that retimes the one wire of a front end that joins its SPADs.
 pub(crate) const JOINED: &str = "joined";
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: FrontEndVariant = FrontEndVariant {
     circuit: |config| circuit(config.spads()),
     joins: false,
     shapes: false,
@@ -89,13 +89,13 @@ pub fn circuit(spads: usize) -> Arc<Module> {
 
 /// Reference model: one bit per SPAD.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Model {
+pub struct SummationModel {
     toggle: u64,
     first: u64,
     second: u64,
 }
 
-impl Model {
+impl SummationModel {
     /// A pulse of one SPAD.
     pub fn pulse(&mut self, spad: u8) {
         self.toggle ^= 1 << spad;
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_pulse_lasts_one_period_and_two_cancel() {
-        let mut model = Model::default();
+        let mut model = SummationModel::default();
         model.pulse(3);
         model.clock();
         assert_eq!(model.spad_timed(), 1 << 3);

@@ -17,10 +17,10 @@ use std::sync::Arc;
 
 use super::summation::{JOINED, TOGGLE};
 use crate::chip::blocks::finished;
-use crate::chip::blocks::front_end::variant::{Variant, pins};
+use crate::chip::blocks::front_end::variant::{FrontEndVariant, pins};
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: FrontEndVariant = FrontEndVariant {
     circuit: |config| circuit(config.spads()),
     joins: true,
     shapes: false,

@@ -18,15 +18,15 @@ use std::sync::Arc;
 
 use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
-use crate::chip::blocks::p_counter::variant::{Counter, Variant};
+use crate::chip::blocks::p_counter::variant::{Counter, PCounterVariant};
 use crate::chip::config::SensorConfig;
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: PCounterVariant = PCounterVariant {
     model: |config, start| Box::new(Model::new(config.counter_bits, start)),
     nets: &["EQUAL"],
     no_msb: Some("counts up"),
-    ..Variant::down_counter(circuit, "a stage with a comparator", 62)
+    ..PCounterVariant::down_counter(circuit, "a stage with a comparator", 62)
 };
 
 /// The counter and comparator of `bits` bits, at least 2; ports as in [`circuit`](crate::chip::p_counter::circuit).

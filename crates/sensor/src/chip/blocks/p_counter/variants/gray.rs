@@ -30,14 +30,14 @@ use std::sync::Arc;
 
 use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
-use crate::chip::blocks::p_counter::variant::Variant;
+use crate::chip::blocks::p_counter::variant::PCounterVariant;
 use crate::chip::config::{SensorConfig, Tap};
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: PCounterVariant = PCounterVariant {
     code: |count| count ^ count >> 1,
     nets: &["GRAY_PARITY", "GRAY_START"],
-    ..Variant::down_counter(circuit, "a stage in Gray code", 82)
+    ..PCounterVariant::down_counter(circuit, "a stage in Gray code", 82)
 };
 
 /// The counter with `bits` programmable stages; ports as in [`circuit`](crate::chip::p_counter::circuit).

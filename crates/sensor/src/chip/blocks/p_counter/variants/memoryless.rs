@@ -28,15 +28,15 @@ use std::sync::Arc;
 
 use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
-use crate::chip::blocks::p_counter::variant::Variant;
+use crate::chip::blocks::p_counter::variant::PCounterVariant;
 use crate::chip::config::SensorConfig;
 use crate::chip::p_counter_timing::SHORTEST_CHAIN;
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: PCounterVariant = PCounterVariant {
     nets: &["LOAD_PULSE"],
     has_memory: false,
-    ..Variant::down_counter(circuit, "a stage without memory", 42)
+    ..PCounterVariant::down_counter(circuit, "a stage without memory", 42)
 };
 
 /// The counter with `bits` stages; ports as in [`circuit`](crate::chip::p_counter::circuit).

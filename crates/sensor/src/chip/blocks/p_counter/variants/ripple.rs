@@ -26,11 +26,11 @@ use std::sync::Arc;
 
 use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
-use crate::chip::blocks::p_counter::variant::Variant;
+use crate::chip::blocks::p_counter::variant::PCounterVariant;
 use crate::chip::config::SensorConfig;
 use crate::netlist::{Module, ModuleBuilder};
 
-pub(crate) const VARIANT: Variant = Variant::down_counter(circuit, "a stage", 52);
+pub(crate) const VARIANT: PCounterVariant = PCounterVariant::down_counter(circuit, "a stage", 52);
 
 /// The counter with `bits` programmable stages; ports as in [`circuit`](crate::chip::p_counter::circuit).
 fn circuit(config: &SensorConfig) -> Arc<Module> {

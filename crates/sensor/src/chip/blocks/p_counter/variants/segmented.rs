@@ -26,12 +26,12 @@ use std::sync::Arc;
 
 use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
-use crate::chip::blocks::p_counter::variant::Variant;
+use crate::chip::blocks::p_counter::variant::PCounterVariant;
 use crate::chip::config::SensorConfig;
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
-pub(crate) const VARIANT: Variant =
-    Variant::down_counter(circuit, "the third stage of a segment", 64);
+pub(crate) const VARIANT: PCounterVariant =
+    PCounterVariant::down_counter(circuit, "the third stage of a segment", 64);
 
 /// Bits that count synchronously.
 const SEGMENT: usize = 3;

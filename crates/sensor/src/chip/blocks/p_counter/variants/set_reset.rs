@@ -25,14 +25,14 @@ use std::sync::Arc;
 
 use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
-use crate::chip::blocks::p_counter::variant::Variant;
+use crate::chip::blocks::p_counter::variant::PCounterVariant;
 use crate::chip::config::SensorConfig;
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: PCounterVariant = PCounterVariant {
     nets: &["COUNTER_RESET_D"],
     clears_first: true,
-    ..Variant::down_counter(circuit, "a stage of set/reset flip-flops", 66)
+    ..PCounterVariant::down_counter(circuit, "a stage of set/reset flip-flops", 66)
 };
 
 /// The counter with `bits` programmable stages; ports as in [`circuit`](crate::chip::p_counter::circuit).

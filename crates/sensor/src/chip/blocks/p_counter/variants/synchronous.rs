@@ -22,13 +22,13 @@ use std::sync::Arc;
 
 use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
-use crate::chip::blocks::p_counter::variant::Variant;
+use crate::chip::blocks::p_counter::variant::PCounterVariant;
 use crate::chip::config::{SensorConfig, Tap};
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-pub(crate) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: PCounterVariant = PCounterVariant {
     nets: &["NEXT"],
-    ..Variant::down_counter(circuit, "a synchronous stage", 68)
+    ..PCounterVariant::down_counter(circuit, "a synchronous stage", 68)
 };
 
 /// The counter with `bits` programmable stages; ports as in [`circuit`](crate::chip::p_counter::circuit).

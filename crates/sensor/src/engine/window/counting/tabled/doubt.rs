@@ -1,6 +1,6 @@
 //! The SPADs that a table leaves in doubt: their photons by exact times, and by history where these depend on what came before.
 
-use super::{Tabled, Tabling};
+use super::{TableScratch, Tabling};
 use crate::engine::window::counting::{Counting, CycleWindow, Pixel};
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::engine::window::table::{Places, Table, WORD};
@@ -12,8 +12,13 @@ const PLACE_SHIFT: u32 = 46;
 
 impl Tabling<'_> {
     /// Notes the photons in doubt.
-    pub(super) fn collect(&self, counting: &Counting<'_>, pixel: &Pixel<'_>, kept: &mut Tabled) {
-        let Tabled {
+    pub(super) fn collect(
+        &self,
+        counting: &Counting<'_>,
+        pixel: &Pixel<'_>,
+        kept: &mut TableScratch,
+    ) {
+        let TableScratch {
             table,
             drawn,
             echoes,
@@ -32,12 +37,12 @@ impl Tabling<'_> {
             for (number, &word) in (0..).zip(words) {
                 // Written always, kept if so: no branch to mispredict.
                 unknown[found] = number;
-                found += usize::from(is_in_doubt(places.of(word)));
+                found += usize::from(is_in_doubt(places.place(word)));
             }
             found
         };
         for ((part, drawn), echo) in pixel.parts.iter().zip(&*drawn).zip(&*echoes) {
-            if part.breeds() {
+            if part.has_secondaries() {
                 continue;
             }
             for (draw, later) in [(&drawn.own, 0), (&drawn.previous, 1)] {
@@ -48,7 +53,7 @@ impl Tabling<'_> {
                         let found = numbers(places, words, unknown);
                         keys.extend(unknown[..found].iter().map(|&number| {
                             let word = words[number as usize];
-                            let place = places.of(word);
+                            let place = places.place(word);
                             let cycle = self.group.first_cycle() + self.split(place).0;
                             let time_fs = part.slots().time_fs(run.slot, word);
                             key(place, time_fs - counting.moved_fs(cycle, later))
@@ -125,7 +130,7 @@ impl Counting<'_> {
         &mut self,
         pixel: &mut Pixel<'_>,
         tabling: &mut Tabling<'_>,
-        kept: &mut Tabled,
+        kept: &mut TableScratch,
     ) {
         let mut keys = std::mem::take(&mut kept.keys);
         let first = tabling.group.first_cycle();
