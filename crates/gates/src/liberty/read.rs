@@ -34,6 +34,7 @@ pub struct Liberty {
 
 impl Liberty {
     /// What a cell does, if it is a gate of up to six inputs or a flip-flop.
+    #[cfg(feature = "yosys")]
     pub(crate) fn function(&self, cell: &str) -> Option<&CellFunction> {
         self.functions.get(cell)
     }

@@ -36,6 +36,7 @@ impl TimingArc {
     }
 
     /// The same in every corner.
+    #[cfg(feature = "liberty")]
     pub(crate) const fn fixed(delay: ArcDelay) -> Self {
         TimingArc {
             rise: Delay::fixed(delay.rise_fs),

@@ -28,6 +28,7 @@ mod timing;
 mod variation;
 
 pub use builder::ModuleBuilder;
+#[cfg(feature = "yosys")]
 pub(crate) use builder::is_identifier;
 pub(crate) use cell::next_state;
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};

@@ -60,6 +60,7 @@ impl Timing {
 
     /// Gives the cells from `first` on the delays and limits of a block's, which is of as many cells. `known` is what this gave
     /// for the same block before: its sets are shared.
+    #[cfg(feature = "liberty")]
     pub(crate) fn adopt(&mut self, first: usize, block: &Timing, known: Option<u32>) -> u32 {
         let base = known.unwrap_or_else(|| {
             let base = self.sets.len() as u32;

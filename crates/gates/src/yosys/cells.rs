@@ -1,5 +1,6 @@
 //! Yosys's generic cells as cells of the library: [`place`] is the one function that knows cell types.
 
+#[cfg(feature = "liberty")]
 mod library;
 
 use std::collections::HashMap;
@@ -215,6 +216,7 @@ impl<'d> Placing<'d> {
 /// Places the cells that do what a cell of this type does; false where there are none.
 fn place(to: &mut Placing<'_>, given: &Given<'_>) -> Result<bool, YosysError> {
     let kind = given.of.kind.as_str();
+    #[cfg(feature = "liberty")]
     if let Some(function) = &given.of.of_library {
         library::place(to, given, function)?;
         return Ok(true);

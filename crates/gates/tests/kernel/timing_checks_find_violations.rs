@@ -340,6 +340,7 @@ fn a_violation_makes_the_state_unknown_downstream_until_a_reset() {
 }
 
 /// A report survives JSON.
+#[cfg(feature = "serde")]
 #[test]
 fn a_report_round_trips_through_json() {
     let steps = script(CellKind::Dffr, CheckKind::Hold, ("R", Edge::Rise), 4);
