@@ -11,7 +11,7 @@ use crate::files::{InputError, OutputFile, ResultSet};
 use crate::liberty::{
     Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
 };
-use crate::netlist::Netlist;
+use crate::netlist::{Netlist, ScopeId};
 
 /// Arguments of `gdtof export sdc`.
 #[derive(Args)]
@@ -106,7 +106,7 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
     })?;
     mapped.write_sdc(&file("mapped.sdc"))?;
     notes(set.commit(config)?);
-    let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, 0);
+    let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, ScopeId::TOP);
     tell(format_args!(
         "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0} um2, leakage {:.3} nW\n",
         folder.display(),

@@ -21,7 +21,7 @@ use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
 use crate::files::InputError;
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Netlist, Timing};
+use crate::netlist::{CellId, CellKind, Netlist, Timing};
 use crate::report::{Axis, Chart, Checks, Grid};
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
@@ -145,7 +145,11 @@ impl Tdc {
             .enumerate()
             .filter(|(_, cell)| cell.kind == CellKind::Inv);
         let (inverter, _) = inverters.next().expect("it inverts CLK");
-        let late = Time::from_fs(self.timing.of(inverter)[0][0].to(Logic::One).into());
+        let late = Time::from_fs(
+            self.timing.of(CellId::new(inverter))[0][0]
+                .to(Logic::One)
+                .into(),
+        );
         let first = (from.as_s() * clock.as_hz()) as i64 - 2;
         let falls = (first..).map(move |k| clock.half_periods(2 * k + 1) + late);
         falls.take_while(move |&fall| fall < to)

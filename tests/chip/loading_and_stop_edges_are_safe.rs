@@ -289,14 +289,14 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
 
 fn shortened(netlist: &Netlist, factor: f64) -> Timing {
     let mut timing = Timing::nominal(netlist, &Library::generic_40nm(), Corner::Typ);
-    for index in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
-        if netlist.cells()[index].kind == CellKind::Buf {
-            let mut delays = *timing.of(index);
+    for cell in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
+        if netlist.cells()[cell.index()].kind == CellKind::Buf {
+            let mut delays = *timing.of(cell);
             for arc in delays.as_flattened_mut() {
                 arc.rise_fs = (arc.rise_fs as f64 * factor) as u32;
                 arc.fall_fs = (arc.fall_fs as f64 * factor) as u32;
             }
-            timing.set(index, delays);
+            timing.set(cell, delays);
         }
     }
     timing

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::kernel::{Drive, Kernel, Stimulus};
     use crate::netlist::{
-        ArcDelay, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, Timing,
+        ArcDelay, CellId, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, Timing,
     };
     use Logic::{One, X, Zero};
 
@@ -244,7 +244,10 @@ mod tests {
             rise_fs: 500_000,
             fall_fs: 500_000,
         };
-        timing.set(nand.unwrap(), [[slow; MAX_OUTPUTS]; MAX_INPUTS]);
+        timing.set(
+            CellId::new(nand.unwrap()),
+            [[slow; MAX_OUTPUTS]; MAX_INPUTS],
+        );
         assert_eq!(run(&timing), ((20, [0, 0]), (0, [0, 20])));
     }
 }

@@ -22,7 +22,7 @@ use super::lane_word::Lanes;
 use super::oscillation::{MOST_DELTA_CYCLES, Oscillation};
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, DelayModel, MAX_INPUTS, NetId, Netlist, Timing};
+use crate::netlist::{CellId, CellKind, DelayModel, MAX_INPUTS, NetId, Netlist, Timing};
 use crate::units::Time;
 
 /// Some lanes of one input take a value at one time.
@@ -132,10 +132,10 @@ impl LaneKernel {
             .map(|(i, cell)| CellState {
                 kind: cell.kind,
                 is_dirty: false,
-                model: timing.model(i),
+                model: timing.model(CellId::new(i)),
                 inputs: cell.inputs.map(index),
                 outputs: cell.outputs.map(index),
-                delays: places[timing.set_of(i) as usize],
+                delays: places[timing.set_of(CellId::new(i)) as usize],
                 changed: [0; MAX_INPUTS],
                 state: unknown,
             });

@@ -1,7 +1,7 @@
 //! Who watches the simulation: anything that wants to hear of every value change.
 
 use crate::logic::Logic;
-use crate::netlist::NetId;
+use crate::netlist::{CellId, NetId};
 use crate::units::Time;
 
 /// Hears of every net change, in time order. The kernel takes it as `dyn`, so that only its own crate compiles it, as optimised as that is: a
@@ -10,10 +10,10 @@ pub trait Observer {
     /// `net` took `value` at `time`.
     fn change(&mut self, time: Time, net: NetId, value: Logic);
 
-    /// A flip-flop (index of its cell) whose state is in doubt. The kernel asks after every instant, and makes
+    /// A flip-flop whose state is in doubt. The kernel asks after every instant, and makes
     /// the state unknown, until there is none. An observer that only watches leaves this as it is, at no cost.
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         None
     }
 
@@ -49,7 +49,7 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
 
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         self.0.doubtful().or_else(|| self.1.doubtful())
     }
 
@@ -72,7 +72,7 @@ impl<O: Observer + ?Sized> Observer for &mut O {
     }
 
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         (**self).doubtful()
     }
 

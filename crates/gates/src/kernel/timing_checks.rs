@@ -39,7 +39,7 @@ use super::check_report::{BINS, CheckReport, CheckSummary, Place, Policy, Violat
 use super::observer::Observer;
 use crate::logic::Logic;
 use crate::netlist::{
-    CellKind, CheckKind, Corner, Edge, InstanceLimits, Library, NetId, Netlist, Timing,
+    CellId, CellKind, CheckKind, Corner, Edge, InstanceLimits, Library, NetId, Netlist, Timing,
 };
 use crate::units::Time;
 
@@ -172,8 +172,8 @@ impl TimingChecks {
         let mut index_of: HashMap<InstanceLimits, u32> = HashMap::new();
         self.limits.clear();
         for flip_flop in &mut self.flip_flops {
-            let cell = flip_flop.cell as usize;
-            let limits = *timing.limits(cell, netlist.cells()[cell].kind);
+            let cell = CellId::new(flip_flop.cell as usize);
+            let limits = *timing.limits(cell, netlist.cells()[cell.index()].kind);
             flip_flop.limits = *index_of.entry(limits).or_insert_with(|| {
                 self.limits.push(limits);
                 self.limits.len() as u32 - 1
@@ -203,7 +203,8 @@ impl TimingChecks {
     #[must_use]
     pub fn asynchronous(mut self, netlist: &Netlist, is: impl Fn(&str) -> bool) -> Self {
         for flip_flop in &mut self.flip_flops {
-            flip_flop.is_asynchronous = is(&netlist.cell_path(flip_flop.cell as usize));
+            flip_flop.is_asynchronous =
+                is(&netlist.cell_path(CellId::new(flip_flop.cell as usize)));
         }
         self.grouped()
     }
@@ -226,7 +227,7 @@ impl TimingChecks {
             .sort_by_key(|f| (f.time_fs, f.flip_flop, f.kind, f.pin));
         let path = |found: &Found| {
             let cell = self.flip_flops[found.flip_flop as usize].cell;
-            netlist.cell_path(cell as usize)
+            netlist.cell_path(CellId::new(cell as usize))
         };
         let summaries = CheckKind::ALL.map(|kind| {
             let tally = &self.summaries[kind as usize];
@@ -304,11 +305,12 @@ impl Observer for TimingChecks {
     }
 
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         if self.policy == Policy::ReportOnly {
             return None;
         }
         self.complete();
-        self.doubtful.pop().map(|cell| cell as usize)
+        let cell = self.doubtful.pop()?;
+        Some(CellId::new(cell as usize))
     }
 }

@@ -20,7 +20,8 @@
 
 use super::cell::CellKind;
 use super::corner::Edge;
-use super::flat::{FlatCell, NetId, Netlist};
+use super::flat::{FlatCell, Netlist};
+use super::id::{CellId, NetId};
 use super::timing::Timing;
 use crate::units::Time;
 
@@ -93,7 +94,7 @@ pub struct StaticTiming<'n> {
 /// One arc of the graph.
 struct ArcTo {
     to: Node,
-    cell: usize,
+    cell: CellId,
     pin: usize,
     output: usize,
 }
@@ -135,8 +136,8 @@ impl<'n> StaticTiming<'n> {
         let net = net_of(from).index();
         let loads = self.first_load[net] as usize..self.first_load[net + 1] as usize;
         self.loads[loads].iter().flat_map(move |&(cell, pin)| {
-            let (cell, pin) = (cell as usize, pin as usize);
-            let leaf = &self.netlist.cells()[cell];
+            let (cell, pin) = (CellId::new(cell as usize), pin as usize);
+            let leaf = &self.netlist.cells()[cell.index()];
             let outputs = leaf.outputs.iter().enumerate();
             outputs
                 .filter_map(|(output, net)| Some((output, (*net)?)))
@@ -215,7 +216,7 @@ impl<'n> StaticTiming<'n> {
                 let level = edge_of(arc.to).level();
                 let delays = self.timing.of(cell);
                 let own = delays[pin][arc.output].to(level);
-                let leaf = &self.netlist.cells()[cell];
+                let leaf = &self.netlist.cells()[cell.index()];
                 let quickest = (0..leaf.kind.inputs().len())
                     .filter(|&other| leaf.kind.triggers(other) && can_change(leaf.input(other)))
                     .map(|other| delays[other][arc.output].to(level))
@@ -256,7 +257,7 @@ impl<'n> StaticTiming<'n> {
 #[derive(Debug, Clone, Copy)]
 struct Cause {
     from: Node,
-    cell: usize,
+    cell: CellId,
     pin: usize,
 }
 
@@ -283,9 +284,9 @@ pub struct Arrivals<'n> {
 
 impl Arrivals<'_> {
     /// How long after its clock a flip-flop changes its own D, in the direction of `edge`, where D is one of its outputs.
-    pub(crate) fn own_data(&self, cell: usize, edge: Edge) -> Option<Time> {
+    pub(crate) fn own_data(&self, cell: CellId, edge: Edge) -> Option<Time> {
         const CLOCK: usize = 1;
-        let leaf = &self.netlist.cells()[cell];
+        let leaf = &self.netlist.cells()[cell.index()];
         let [data, ..] = leaf.inputs;
         let output = leaf.outputs.iter().position(|&net| net == data)?;
         let delay = self.timing.of(cell)[CLOCK][output].to(edge.level());
@@ -317,7 +318,7 @@ impl Arrivals<'_> {
         while let Some(index) = at {
             let arrival = arrivals[index]?;
             let cell = |cause: Cause| {
-                let kind = self.netlist.cells()[cause.cell].kind;
+                let kind = self.netlist.cells()[cause.cell.index()].kind;
                 let path = self.netlist.cell_path(cause.cell);
                 format!("{path} {} {}", kind.name(), kind.inputs()[cause.pin])
             };

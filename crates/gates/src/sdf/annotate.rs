@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
 use crate::InputError;
-use crate::netlist::{ArcDelay, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing};
+use crate::netlist::{
+    ArcDelay, CellId, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing,
+};
 
 /// What an annotation did.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -59,10 +61,10 @@ pub fn annotate(
     Ok(annotator.result)
 }
 
-fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<usize>> {
-    let mut cells: HashMap<CellKind, Vec<usize>> = HashMap::new();
+fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<CellId>> {
+    let mut cells: HashMap<CellKind, Vec<CellId>> = HashMap::new();
     for (index, cell) in netlist.cells().iter().enumerate() {
-        cells.entry(cell.kind).or_default().push(index);
+        cells.entry(cell.kind).or_default().push(CellId::new(index));
     }
     cells
 }
@@ -71,7 +73,7 @@ fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<usize>> {
 type ArcSlots = [[[Option<i64>; 2]; 2]; 2];
 
 /// Delays of the stages (rise, fall, fs) by cell, and the line of the last of them.
-pub(super) type Stages = HashMap<usize, (Vec<[i64; 2]>, usize)>;
+pub(super) type Stages = HashMap<CellId, (Vec<[i64; 2]>, usize)>;
 
 /// The wire to one input pin.
 pub(super) struct Wire {
@@ -82,10 +84,10 @@ pub(super) struct Wire {
 
 pub(super) struct Annotator<'n, 's, 'a> {
     pub(super) netlist: &'n Netlist,
-    of_kind: HashMap<CellKind, Vec<usize>>,
+    of_kind: HashMap<CellKind, Vec<CellId>>,
     sdf: &'s Sdf<'a>,
     pub(super) corner: Corner,
-    pub(super) wires: HashMap<(usize, usize), Wire>,
+    pub(super) wires: HashMap<(CellId, usize), Wire>,
     pub(super) stages: Stages,
     pub(super) result: Annotation,
 }
@@ -124,7 +126,7 @@ impl Annotator<'_, '_, '_> {
             }
             (SdfInstance::Path(path), _) => {
                 let (name, wanted) = if let Some(cell) = self.netlist.cell(path) {
-                    let name = self.netlist.cells()[cell].kind.name();
+                    let name = self.netlist.cells()[cell.index()].kind.name();
                     if name == entry.cell_type {
                         return self.leaf(timing, entry, cell);
                     }
@@ -132,7 +134,7 @@ impl Annotator<'_, '_, '_> {
                 } else if let Some(stage) = Chain::find(self.netlist, path) {
                     return self.stage(timing, entry, stage);
                 } else if let Some(scope) = self.netlist.scope(path) {
-                    let name = self.netlist.scopes()[scope].module.name();
+                    let name = self.netlist.scopes()[scope.index()].module.name();
                     if name == entry.cell_type {
                         return self.module(entry, path);
                     }
@@ -171,8 +173,8 @@ impl Annotator<'_, '_, '_> {
             Some(path)
         });
         let is_there = |path: &&str| {
-            let [cell, scope] = [self.netlist.cell(path), self.netlist.scope(path)];
-            !path.is_empty() && (cell.is_some() || scope.is_some())
+            let is_cell = self.netlist.cell(path).is_some();
+            !path.is_empty() && (is_cell || self.netlist.scope(path).is_some())
         };
         below.find(is_there).map(str::to_owned)
     }
@@ -197,10 +199,10 @@ impl Annotator<'_, '_, '_> {
         &mut self,
         timing: &mut Timing,
         entry: &SdfCell<'_>,
-        cell: usize,
+        cell: CellId,
     ) -> Result<(), InputError> {
         self.limits(timing, entry, cell)?;
-        let kind = self.netlist.cells()[cell].kind;
+        let kind = self.netlist.cells()[cell.index()].kind;
         let mut slots: [ArcSlots; MAX_INPUTS] = Default::default();
         let mut last_line = [entry.line; MAX_INPUTS];
         for delay in &entry.delays {

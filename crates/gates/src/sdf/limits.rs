@@ -13,7 +13,7 @@
 use super::annotate::Annotator;
 use super::{CheckKeyword as Entry, PinEdge, SdfCell, SdfCheck, Triple};
 use crate::InputError;
-use crate::netlist::{CellKind, CheckKind, Control, Edge, InstanceLimits, Timing};
+use crate::netlist::{CellId, CellKind, CheckKind, Control, Edge, InstanceLimits, Timing};
 
 const NO_SUCH_CHECK: &str = "checks of pins or edges that a flip-flop does not act on";
 const NEGATIVE: &str = "negative limits, which become 0";
@@ -46,9 +46,9 @@ impl Annotator<'_, '_, '_> {
         &mut self,
         timing: &mut Timing,
         entry: &SdfCell<'_>,
-        cell: usize,
+        cell: CellId,
     ) -> Result<(), InputError> {
-        let kind = self.netlist.cells()[cell].kind;
+        let kind = self.netlist.cells()[cell.index()].kind;
         let before = *timing.limits(cell, kind);
         let mut limits = before;
         for check in &entry.checks {
@@ -178,19 +178,19 @@ mod tests {
     use super::super::tests::{annotated, design, export, nominal};
     use super::super::{Annotation, Sdf, SdfOptions, annotate};
     use super::*;
-    use crate::netlist::Corner;
+    use crate::netlist::{Corner, ScopeId};
 
     fn limits_of(body: &str, path: &str) -> (InstanceLimits, Annotation) {
         let (netlist, timing, result) = annotated(body).unwrap();
         let cell = netlist.cell(path).unwrap();
-        let kind = netlist.cells()[cell].kind;
+        let kind = netlist.cells()[cell.index()].kind;
         (*timing.limits(cell, kind), result)
     }
 
     #[test]
     fn limits_reach_the_instance_the_check_and_the_edge_they_are_for() {
         use crate::netlist::CheckKind as Check;
-        let nominal = *nominal(&design(), Corner::Typ).limits(0, CellKind::Dffsr);
+        let nominal = *nominal(&design(), Corner::Typ).limits(CellId::new(0), CellKind::Dffsr);
         let body = |checks: &str| {
             format!("(CELL (CELLTYPE \"DFFSR\") (INSTANCE u1/dffsr) (TIMINGCHECK {checks}))")
         };
@@ -324,7 +324,7 @@ mod tests {
         for (corner, wanted) in Corner::ALL.into_iter().zip(&corners) {
             let mut timing = nominal(&netlist, Corner::Typ);
             annotate(&mut timing, &netlist, &sdf, corner).unwrap();
-            for (cell, flat) in netlist.cells().iter().enumerate() {
+            for (cell, flat) in netlist.cells_below(ScopeId::TOP).zip(netlist.cells()) {
                 if flat.kind.is_flip_flop() {
                     let [found, wanted] = [&timing, wanted].map(|t| exported(t, cell, flat.kind));
                     assert_eq!(found, wanted, "{}", netlist.cell_path(cell));
@@ -334,7 +334,7 @@ mod tests {
     }
 
     /// What a file says of a flip-flop: nothing of S where it has none.
-    fn exported(timing: &Timing, cell: usize, kind: CellKind) -> Vec<SdfCheck<'static>> {
+    fn exported(timing: &Timing, cell: CellId, kind: CellKind) -> Vec<SdfCheck<'static>> {
         checks_of(kind, [timing.limits(cell, kind); 3])
     }
 }

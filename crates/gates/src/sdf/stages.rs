@@ -3,7 +3,7 @@
 use super::annotate::Annotator;
 use super::{DelayPath, SdfCell};
 use crate::InputError;
-use crate::netlist::{ArcDelay, Chain, MAX_INPUTS, MAX_OUTPUTS, Timing};
+use crate::netlist::{ArcDelay, CellId, Chain, MAX_INPUTS, MAX_OUTPUTS, Timing};
 
 impl Annotator<'_, '_, '_> {
     /// Takes the delays of one stage.
@@ -11,7 +11,7 @@ impl Annotator<'_, '_, '_> {
         &mut self,
         timing: &Timing,
         entry: &SdfCell<'_>,
-        (cell, chain, number): (usize, Chain, usize),
+        (cell, chain, number): (CellId, Chain, usize),
     ) -> Result<(), InputError> {
         let module = chain.stage_module();
         if module != entry.cell_type {

@@ -4,7 +4,9 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::InputError;
-use crate::netlist::{CellKind, Library, ModuleBuilder, Netlist, OwnDelay, Timing};
+use crate::netlist::{
+    CellId, CellKind, Library, ModuleBuilder, Netlist, OwnDelay, ScopeId, Timing,
+};
 
 /// An inverter and a module of one cell of every kind, twice.
 pub(super) fn design() -> Netlist {
@@ -38,7 +40,8 @@ pub(super) fn nominal(netlist: &Netlist, corner: Corner) -> Timing {
 
 /// Compares the pins that cells have.
 fn same(netlist: &Netlist, a: &Timing, b: &Timing) -> bool {
-    netlist.cells().iter().enumerate().all(|(cell, flat)| {
+    let mut cells = netlist.cells_below(ScopeId::TOP).zip(netlist.cells());
+    cells.all(|(cell, flat)| {
         let (inputs, outputs) = (flat.kind.inputs().len(), flat.kind.outputs().len());
         let pins = (0..inputs).flat_map(|input| (0..outputs).map(move |output| (input, output)));
         pins.into_iter()
@@ -74,7 +77,7 @@ fn arc(body: &str, path: &str, pin: usize) -> (u32, u32) {
 fn arc_to(body: &str, path: &str, (pin, output): (usize, usize)) -> (u32, u32) {
     let (netlist, timing, _) = annotated(body).unwrap();
     let path = format!("chip.{path}");
-    let mut cells = 0..netlist.cells().len();
+    let mut cells = netlist.cells_below(ScopeId::TOP);
     let cell = cells.find(|&c| netlist.cell_path(c) == path).unwrap();
     let arc = timing.of(cell)[pin][output];
     (arc.rise_fs, arc.fall_fs)
@@ -180,7 +183,7 @@ fn stages_of_a_chain_add_up_to_its_cell() {
             &Sdf::parse("a.sdf", &text)?,
             Corner::Typ,
         )?;
-        let arc = timing.of(0)[0][0];
+        let arc = timing.of(CellId::new(0))[0][0];
         Ok::<_, InputError>((arc.rise_fs, arc.fall_fs))
     };
     let stage = |number: u32, cell_type: &str, entry: &str| {
@@ -417,15 +420,15 @@ fn nominal_delays_come_back_exactly_in_every_corner() {
 fn randomised(netlist: &Netlist, corner: Corner, values: &[u32]) -> Timing {
     let mut timing = nominal(netlist, corner);
     let mut values = values.iter().cycle().copied();
-    for (index, cell) in netlist.cells().iter().enumerate() {
-        let mut delays = *timing.of(index);
+    for (id, cell) in netlist.cells_below(ScopeId::TOP).zip(netlist.cells()) {
+        let mut delays = *timing.of(id);
         for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin)) {
             for delay in &mut delays[pin][..cell.kind.outputs().len()] {
                 delay.rise_fs = values.next().unwrap();
                 delay.fall_fs = values.next().unwrap();
             }
         }
-        timing.set(index, delays);
+        timing.set(id, delays);
     }
     timing
 }

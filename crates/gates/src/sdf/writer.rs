@@ -8,7 +8,7 @@ use super::{PinEdge, SdfCheck, Triple, join};
 use crate::Origin;
 use crate::netlist::{
     ArcDelay, Cell, CellDelays, CellKind, Chain, Corner, Edge, InstanceLimits, Library, MAX_INPUTS,
-    MAX_OUTPUTS, Module, Netlist, Timing,
+    MAX_OUTPUTS, Module, Netlist, ScopeId, Timing,
 };
 
 /// What stands between the names of a path.
@@ -66,10 +66,11 @@ pub fn write_sdf(
     let design = netlist.scopes()[0].module.name();
     write_head(out, design, options)?;
     for (index, scope) in netlist.scopes().iter().enumerate() {
+        let id = ScopeId::new(index);
         // Paths start below the top.
-        let path = netlist.scope_path(index);
+        let path = netlist.scope_path(id);
         let path = path[design.len()..].trim_start_matches('.');
-        for (cell, leaf) in netlist.cells_of(index).zip(scope.module.cells()) {
+        for (cell, leaf) in netlist.cells_of(id).zip(scope.module.cells()) {
             let delays = corners.map(|timing| *timing.of(cell));
             let limits = corners.map(|timing| timing.limits(cell, leaf.kind));
             write_cell(out, &join(path, &leaf.name), leaf, delays, limits, options)?;

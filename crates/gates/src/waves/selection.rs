@@ -81,10 +81,10 @@ impl Selection {
             let scope = netlist
                 .scope(path)
                 .ok_or_else(|| no_such("instance", path, netlist))?;
-            levels[scope] = Some(self.depth);
+            levels[scope.index()] = Some(self.depth);
         }
         for i in 1..scopes.len() {
-            let inherited = levels[scopes[i].parent].and_then(|left| left.checked_sub(1));
+            let inherited = levels[scopes[i].parent.index()].and_then(|left| left.checked_sub(1));
             levels[i] = levels[i].max(inherited);
         }
         let mut coverage: Vec<Coverage> = levels
@@ -96,7 +96,7 @@ impl Selection {
             .collect();
         // Parents come before their children, so going backwards completes every path.
         for i in (1..scopes.len()).rev() {
-            let parent = scopes[i].parent;
+            let parent = scopes[i].parent.index();
             if coverage[i] != Coverage::Nothing && coverage[parent] == Coverage::Nothing {
                 coverage[parent] = Coverage::Path;
             }

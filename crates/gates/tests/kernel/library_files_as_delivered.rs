@@ -7,7 +7,7 @@ use femtogate::liberty::{
     Characterised, Clocking, Environment, Liberty, write_constraints, write_mapped,
     write_mapped_cells, write_mapped_sdf,
 };
-use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+use femtogate::netlist::{CellId, CellKind, ModuleBuilder, Netlist};
 use femtogate::units::Time;
 
 fn text() -> String {
@@ -146,7 +146,7 @@ fn capacitance_of_outputs_is_a_load() {
             wire_ff: 0.0,
         };
         let made = Characterised::new(&netlist, &library, &environment);
-        let arc = made.timing.of(0)[0][0];
+        let arc = made.timing.of(CellId::new(0))[0][0];
         [arc.rise_fs, arc.fall_fs].map(f64::from)
     };
     let before = delays(&text());

@@ -11,7 +11,7 @@ use femtogate::kernel::{CheckReport, Kernel, Policy, Recorder, Stimulus, TimingC
 use femtogate::logic::Logic;
 use femtogate::netlist::{
     CellKind, CheckKind, CheckLimits, Corner, DataLimit, Delay, Edge, Library, NetId, Netlist,
-    TimingArc,
+    ScopeId, TimingArc,
 };
 use femtogate::units::Time;
 use proptest::prelude::*;
@@ -148,9 +148,9 @@ fn judged(
     trace: &Recorder,
     limits: &CheckLimits,
 ) -> Result<(), TestCaseError> {
-    let cells = netlist.cells().iter().enumerate();
-    for (index, cell) in cells.filter(|(_, cell)| cell.kind.is_flip_flop()) {
-        let path = netlist.cell_path(index);
+    let cells = netlist.cells_below(ScopeId::TOP).zip(netlist.cells());
+    for (id, cell) in cells.filter(|(_, cell)| cell.kind.is_flip_flop()) {
+        let path = netlist.cell_path(id);
         let mut found: Vec<_> = report
             .violations
             .iter()

@@ -30,7 +30,7 @@ use super::tape::{Action, Code, PassTape, SINK, ZERO};
 use super::unlevelled::Unlevelled;
 use super::word::inversion;
 use crate::chip::{Exposure, SensorConfig, Silicon};
-use crate::netlist::{CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
+use crate::netlist::{CellId, CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
 use crate::units::Time;
 
 mod actions;
@@ -391,7 +391,9 @@ fn fastest_cell_fs(survey: &Survey) -> i64 {
     let cells = survey.netlist.cells().iter().enumerate();
     let delays = cells.flat_map(|(index, cell)| {
         let pins = (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin));
-        pins.flat_map(move |pin| &survey.timing.of(index)[pin][..cell.kind.outputs().len()])
+        pins.flat_map(move |pin| {
+            &survey.timing.of(CellId::new(index))[pin][..cell.kind.outputs().len()]
+        })
     });
     delays
         .map(|arc| i64::from(arc.rise_fs.min(arc.fall_fs)))

@@ -69,13 +69,13 @@ impl Leveliser<'_> {
         let outputs = self.survey.netlist.cells()[arc.cell].outputs;
         let output = outputs.iter().position(|&net| net == Some(to.0));
         let output = output.expect("an arc leads to an output");
-        i64::from(self.survey.timing.of(arc.cell)[arc.pin][output].to(to.1.level()))
+        i64::from(self.survey.timing.of(CellId::new(arc.cell))[arc.pin][output].to(to.1.level()))
     }
 
     /// The longest delay to any output: a draft of a flip-flop stands for what both of them do.
     pub(super) fn longest_delay(&self, cell: usize, pin: usize) -> i64 {
         let leaf = &self.survey.netlist.cells()[cell];
-        let arcs = &self.survey.timing.of(cell)[pin];
+        let arcs = &self.survey.timing.of(CellId::new(cell))[pin];
         let connected = arcs
             .iter()
             .zip(leaf.outputs)
@@ -199,7 +199,9 @@ impl Leveliser<'_> {
         } else if early != late {
             return Err(self.ambiguous(node.0, (early, late)));
         } else if is_released {
-            return Err(Unlevelled::Clear(self.survey.netlist.cell_path(arc.cell)));
+            return Err(Unlevelled::Clear(
+                self.survey.netlist.cell_path(CellId::new(arc.cell)),
+            ));
         } else {
             None
         };

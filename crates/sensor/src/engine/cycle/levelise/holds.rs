@@ -105,7 +105,9 @@ impl Leveliser<'_> {
             let mut released = reach.held.difference(&held);
             let is_own = |cell: &&usize| Self::controls_of(&cells[**cell]).any(|n| n == cause.net);
             if let Some(&cell) = released.find(|cell| cause.value && is_own(cell)) {
-                return Err(Unlevelled::Clear(self.survey.netlist.cell_path(cell)));
+                return Err(Unlevelled::Clear(
+                    self.survey.netlist.cell_path(CellId::new(cell)),
+                ));
             }
             if held.len() == reach.held.len() {
                 return Ok(reach);
