@@ -281,9 +281,7 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
             .map(|&t| t - origin)
             .collect(),
         events: found.map(|e| e.kind).collect(),
-        violations: violations
-            .map(|v| (v.kind, Time::from_fs(v.time_fs) - origin))
-            .collect(),
+        violations: violations.map(|v| (v.kind, v.time - origin)).collect(),
     }
 }
 

@@ -240,8 +240,8 @@ impl TimingChecks {
                 worst: tally.worst.as_ref().map(|found| Place {
                     cell: path(found),
                     pin: PINS[found.pin as usize].to_owned(),
-                    time_fs: found.time_fs,
-                    slack_fs: found.slack_fs,
+                    time: Time::from_fs(found.time_fs),
+                    slack: Time::from_fs(found.slack_fs),
                 }),
                 histogram: tally.histogram.to_vec(),
             }
@@ -251,15 +251,15 @@ impl TimingChecks {
             cell: path(found),
             pin: PINS[found.pin as usize].to_owned(),
             edge: found.edge,
-            time_fs: found.time_fs,
-            slack_fs: found.slack_fs,
+            time: Time::from_fs(found.time_fs),
+            slack: Time::from_fs(found.slack_fs),
             is_asynchronous: found.is_asynchronous,
         });
         let asynchronous = self.flip_flops.iter().filter(|f| f.is_asynchronous);
         CheckReport {
             policy: self.policy,
             corner: self.corner,
-            not_before_fs: (self.not_before_fs != NEVER).then_some(self.not_before_fs),
+            not_before: (self.not_before_fs != NEVER).then_some(Time::from_fs(self.not_before_fs)),
             flip_flops: self.flip_flops.len(),
             asynchronous_flip_flops: asynchronous.count(),
             memory_bytes: self.memory_bytes(),

@@ -7,6 +7,7 @@ use crate::InputError;
 use crate::netlist::{
     ArcDelay, CellId, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing,
 };
+use crate::units::Time;
 
 /// What an annotation did.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -19,8 +20,8 @@ pub struct Annotation {
     pub checks: usize,
     /// Delays and limits that could not be taken over as they are.
     pub notes: Vec<Skipped>,
-    /// Longest wire delay left out because it ends at a flip-flop's D, fs.
-    pub longest_wire_to_d_fs: i64,
+    /// Longest wire delay left out because it ends at a flip-flop's D.
+    pub longest_wire_to_d: Time,
 }
 
 impl Annotation {
@@ -289,7 +290,7 @@ impl Annotator<'_, '_, '_> {
                 continue;
             }
             for (slot, (value, before)) in slot.iter_mut().zip(values) {
-                if let Some(fs) = value.at(self.corner) {
+                if let Some(fs) = value.at(self.corner).map(Time::as_fs) {
                     *slot = Some(if delay.increment {
                         slot.unwrap_or(before as i64) + fs
                     } else {

@@ -14,6 +14,7 @@ use super::annotate::Annotator;
 use super::{CheckKeyword as Entry, PinEdge, SdfCell, SdfCheck, Triple};
 use crate::InputError;
 use crate::netlist::{CellId, CellKind, CheckKind, Control, Edge, InstanceLimits, Timing};
+use crate::units::Time;
 
 const NO_SUCH_CHECK: &str = "checks of pins or edges that a flip-flop does not act on";
 const NEGATIVE: &str = "negative limits, which become 0";
@@ -68,14 +69,14 @@ impl Annotator<'_, '_, '_> {
             // Two limits are one for each of two slots; one limit may be for both.
             let of_slot = [0, check.kind.limits() - 1].map(|limit| check.limits[limit]);
             for (slot, limit) in slots.into_iter().zip(of_slot) {
-                let (Some(slot), Some(fs)) = (slot, limit.at(self.corner)) else {
+                let (Some(slot), Some(limit)) = (slot, limit.at(self.corner)) else {
                     continue;
                 };
-                if fs < 0 {
+                if limit < Time::ZERO {
                     self.note(NEGATIVE, check.line);
                 }
                 // The parser lets nothing beyond 32 bits through.
-                enter(&mut limits, slot, u32::try_from(fs).unwrap_or(0));
+                enter(&mut limits, slot, u32::try_from(limit.as_fs()).unwrap_or(0));
             }
         }
         if limits != before {
@@ -133,7 +134,10 @@ fn enter(limits: &mut InstanceLimits, (check, control, edge): Slot, fs: u32) {
 /// The checks of a flip-flop with these limits in the three corners.
 pub(crate) fn checks_of(kind: CellKind, corners: [&InstanceLimits; 3]) -> Vec<SdfCheck<'static>> {
     let limit = |control, check, edge| {
-        Triple(corners.map(|limits| Some(limits.at(control, check, edge).into())))
+        Triple(corners.map(|limits| {
+            let fs = limits.at(control, check, edge);
+            Some(Time::from_fs(fs.into()))
+        }))
     };
     let pin = |edge, pin: &'static str| PinEdge {
         edge: Some(edge),

@@ -4,6 +4,7 @@ use super::annotate::Annotator;
 use super::{DelayPath, SdfCell};
 use crate::InputError;
 use crate::netlist::{ArcDelay, CellId, Chain, MAX_INPUTS, MAX_OUTPUTS, Timing};
+use crate::units::Time;
 
 impl Annotator<'_, '_, '_> {
     /// Takes the delays of one stage.
@@ -39,7 +40,7 @@ impl Annotator<'_, '_, '_> {
             });
             *line = delay.line;
             for (member, value) in stages[number].iter_mut().zip([delay.rise, delay.fall]) {
-                if let Some(fs) = value.at(self.corner) {
+                if let Some(fs) = value.at(self.corner).map(Time::as_fs) {
                     *member = fs + if delay.increment { *member } else { 0 };
                 }
             }

@@ -7,6 +7,7 @@ use crate::InputError;
 use crate::netlist::{
     CellId, CellKind, Library, ModuleBuilder, Netlist, OwnDelay, ScopeId, Timing,
 };
+use crate::units::Time;
 
 /// An inverter and a module of one cell of every kind, twice.
 pub(super) fn design() -> Netlist {
@@ -234,7 +235,7 @@ fn wires_are_added_to_the_arcs_their_edges_cause() {
     assert_eq!(arc(&body, "u1.dffr", 1), (80_311, 80_311));
     let result = annotated(&body).unwrap().2;
     assert_eq!((result.arcs, result.wires, result.notes.len()), (1, 3, 3));
-    assert_eq!(result.longest_wire_to_d_fs, 7_000);
+    assert_eq!(result.longest_wire_to_d, Time::from_ps(7));
     let port = inv("(ABSOLUTE (PORT A (3)))");
     assert_eq!(arc(&port, "u1.inv", 0), (24_013, 21_979));
 }
@@ -264,7 +265,7 @@ fn what_is_not_modelled_is_counted() {
     assert_eq!(checks.len(), 3);
     assert_eq!(
         checks[1].limits,
-        [Triple::fixed(-1000), Triple::fixed(2000)]
+        [-1, 2].map(|ps| Triple::fixed(Time::from_ps(ps)))
     );
 }
 

@@ -72,8 +72,9 @@ impl Annotator<'_, '_, '_> {
         let kind = self.netlist.cells()[cell.index()].kind;
         let values = [delay.rise, delay.fall].map(|triple| triple.at(self.corner));
         if !kind.triggers(pin) {
-            let longest = values.into_iter().flatten().max().unwrap_or(0);
-            self.result.longest_wire_to_d_fs = self.result.longest_wire_to_d_fs.max(longest);
+            let longest = values.into_iter().flatten().max().unwrap_or_default();
+            let longest = self.result.longest_wire_to_d.max(longest);
+            self.result.longest_wire_to_d = longest;
             self.note(WIRE_TO_D, delay.line);
             return;
         }
@@ -90,8 +91,8 @@ impl Annotator<'_, '_, '_> {
             .into_iter()
             .zip(values)
         {
-            if let Some(fs) = value {
-                *member = fs + if delay.increment { *member } else { 0 };
+            if let Some(time) = value {
+                *member = time.as_fs() + if delay.increment { *member } else { 0 };
             }
         }
     }

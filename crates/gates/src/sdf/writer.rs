@@ -10,6 +10,7 @@ use crate::netlist::{
     ArcDelay, Cell, CellDelays, CellKind, Chain, Corner, Edge, InstanceLimits, Library, MAX_INPUTS,
     MAX_OUTPUTS, Module, Netlist, ScopeId, Timing,
 };
+use crate::units::Time;
 
 /// What stands between the names of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -210,8 +211,14 @@ fn body(
         });
         for (number, output) in kind.outputs().iter().enumerate() {
             let arcs = delays.map(|delays| delays[pin][number]);
-            let rise = triple(Triple(arcs.map(|arc| Some(arc.rise_fs.into()))), timescale);
-            let fall = triple(Triple(arcs.map(|arc| Some(arc.fall_fs.into()))), timescale);
+            let rise = triple(
+                Triple(arcs.map(|arc| Some(Time::from_fs(arc.rise_fs.into())))),
+                timescale,
+            );
+            let fall = triple(
+                Triple(arcs.map(|arc| Some(Time::from_fs(arc.fall_fs.into())))),
+                timescale,
+            );
             text += &format!("      (IOPATH {from} {output} {rise} {fall})\n");
         }
     }
@@ -243,7 +250,7 @@ fn pin_edge(pin: &PinEdge<'_>) -> String {
 }
 
 fn triple(triple: Triple, timescale: SdfTimescale) -> String {
-    let number = |fs: Option<i64>| match (fs, timescale) {
+    let number = |time: Option<Time>| match (time.map(Time::as_fs), timescale) {
         (None, _) => String::new(),
         (Some(fs), SdfTimescale::Fs) => fs.to_string(),
         (Some(fs), SdfTimescale::Ps) => {
@@ -265,7 +272,10 @@ mod tests {
 
     #[test]
     fn members_of_a_triple_are_written_where_they_differ() {
-        let text = |members: [Option<i64>; 3], timescale| triple(Triple(members), timescale);
+        let text = |members: [Option<i64>; 3], timescale| {
+            let members = members.map(|fs| fs.map(Time::from_fs));
+            triple(Triple(members), timescale)
+        };
         let (fs, ps) = (SdfTimescale::Fs, SdfTimescale::Ps);
         assert_eq!(text([Some(1_250); 3], ps), "(1.250)");
         assert_eq!(text([Some(1), Some(2), Some(2)], fs), "(1:2:2)");

@@ -155,7 +155,7 @@ fn judged(
             .violations
             .iter()
             .filter(|v| v.cell == path)
-            .map(|v| (v.kind, v.pin.clone(), v.time_fs, v.slack_fs))
+            .map(|v| (v.kind, v.pin.clone(), v.time.as_fs(), v.slack.as_fs()))
             .collect();
         found.sort();
         prop_assert_eq!(
