@@ -258,16 +258,15 @@ impl ModuleBuilder {
         ports: &[(&str, Vec<Option<Net>>)],
     ) {
         let mut connections = Vec::new();
-        let problem = |port: &str, problem| NetlistError::PortMismatch {
-            module: String::new(),
-            instance: name.to_owned(),
-            port: port.to_owned(),
-            problem,
-        };
+        let parent = self.module.name.clone();
         let mut errors = Vec::new();
         for (port, _) in ports {
             if !module.port_signals().any(|(_, s)| s.name == *port) {
-                errors.push(problem(port, "has no"));
+                errors.push(NetlistError::NoPort {
+                    module: parent.clone(),
+                    instance: name.to_owned(),
+                    port: (*port).to_owned(),
+                });
             }
         }
         for (direction, signal) in module.port_signals() {
@@ -289,15 +288,14 @@ impl ModuleBuilder {
                 None if direction == Direction::Output => {
                     connections.extend(signal.nets().map(|_| None));
                 }
-                None => errors.push(problem(&signal.name, "leaves open input")),
+                None => errors.push(NetlistError::OpenInput {
+                    module: parent.clone(),
+                    instance: name.to_owned(),
+                    port: signal.name.clone(),
+                }),
             }
         }
-        for mut error in errors {
-            if let NetlistError::PortMismatch { module, .. } = &mut error {
-                module.clone_from(&self.module.name);
-            }
-            self.fail(error);
-        }
+        errors.into_iter().for_each(|error| self.fail(error));
         self.module.instances.push(Instance {
             name: name.to_owned(),
             module: Arc::clone(module),
@@ -449,7 +447,7 @@ mod tests {
         let leaf = m.finish().unwrap();
         let mut m = ModuleBuilder::new("top");
         m.instance("u", &leaf, &[]);
-        assert!(matches!(m.finish(), Err(NetlistError::PortMismatch { .. })));
+        assert!(matches!(m.finish(), Err(NetlistError::OpenInput { .. })));
     }
 
     #[test]
@@ -467,6 +465,6 @@ mod tests {
         let mut m = ModuleBuilder::new("top");
         m.input("A");
         m.instance_by_names("u", &leaf, &[]);
-        assert!(matches!(m.finish(), Err(NetlistError::PortMismatch { .. })));
+        assert!(matches!(m.finish(), Err(NetlistError::OpenInput { .. })));
     }
 }

@@ -74,11 +74,13 @@ pub fn caused(kind: CellKind, pin: usize, edge: Edge, output: usize) -> &'static
 
 /// Edges go round in a circle.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("edges come back to net {net}: name a net of the loop as a barrier")]
+#[error("edges come back to net {path}: name a net of the loop as a barrier")]
 #[non_exhaustive]
 pub struct TimingLoop {
     /// A net in or behind the loop.
-    pub net: String,
+    pub net: NetId,
+    /// Its dotted path.
+    pub path: String,
 }
 
 /// One netlist with its delays, ready for questions.
@@ -241,9 +243,10 @@ impl<'n> StaticTiming<'n> {
             }
         }
         if let Some(stuck) = (0..nodes).find(|&n| waiting_for[n] > 0) {
-            let net = self.netlist.net_path(net_of(stuck));
-            let net = net.unwrap_or_else(|| "without a name".to_owned());
-            return Err(TimingLoop { net });
+            let net = net_of(stuck);
+            let path = self.netlist.net_path(net);
+            let path = path.unwrap_or_else(|| "without a name".to_owned());
+            return Err(TimingLoop { net, path });
         }
         Ok(Arrivals {
             netlist: self.netlist,

@@ -6,7 +6,7 @@ mod library;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::{Bit, Placed, YosysError};
+use super::{Bit, CellFault, PinFault, Placed, YosysError};
 use crate::netlist::CellKind::{
     self, And2, Buf, Dffr, Dffsr, Inv, Mux2, Nand2, Nor2, Or2, Xnor2, Xor2,
 };
@@ -92,7 +92,7 @@ impl<'d> Placing<'d> {
                 module: self.module.to_owned(),
                 cell: name.to_owned(),
                 kind: of.kind.clone(),
-                why: cure(&of.kind),
+                why: cell_fault(&of.kind),
             })
         }
     }
@@ -186,7 +186,7 @@ impl<'d> Placing<'d> {
             cell: given.name.to_owned(),
             kind: given.of.kind.clone(),
             pin: pin.to_owned(),
-            problem: "must be constant, which takes an input of the module; give it one",
+            problem: PinFault::NoConstant,
         })
     }
 
@@ -194,10 +194,10 @@ impl<'d> Placing<'d> {
         let problem = match given.of.connections.get(pin).map(Vec::as_slice) {
             Some([bit]) => match self.net(bit) {
                 Some(net) => return Ok(net),
-                None => "is connected to a net that nothing drives; drive it",
+                None => PinFault::Undriven,
             },
-            Some([]) | None => "is connected to nothing; connect it",
-            Some(_) => "has several bits; run synth -flatten",
+            Some([]) | None => PinFault::Open,
+            Some(_) => PinFault::Bus,
         };
         Err(YosysError::Pin {
             module: self.module.to_owned(),
@@ -258,22 +258,16 @@ fn place(to: &mut Placing<'_>, given: &Given<'_>) -> Result<bool, YosysError> {
     Ok(true)
 }
 
-/// Why a cell has no counterpart, and what helps.
-fn cure(kind: &str) -> &'static str {
+/// Why a cell has no counterpart.
+fn cell_fault(kind: &str) -> CellFault {
     match kind {
         _ if kind.starts_with("$_DLATCH") || kind.starts_with("$_SR_") || kind == "$dlatch" => {
-            "a latch, which has no counterpart here; write it as a flip-flop"
+            CellFault::Latch
         }
-        _ if kind.starts_with("$mem") => {
-            "a memory, which is not mapped to gates; run synth -flatten; memory_map; techmap"
-        }
-        _ if kind.starts_with("$_") => {
-            "which has no counterpart here; run synth -flatten; abc -g simple"
-        }
-        _ if kind.starts_with('$') => "which is not mapped to gates; run synth -flatten; techmap",
-        _ => {
-            "which is no gate or flip-flop of the sensor's library; run synth -flatten, or give the library (liberty) whose cell it is"
-        }
+        _ if kind.starts_with("$mem") => CellFault::Memory,
+        _ if kind.starts_with("$_") => CellFault::Gate,
+        _ if kind.starts_with('$') => CellFault::NotMapped,
+        _ => CellFault::Unknown,
     }
 }
 

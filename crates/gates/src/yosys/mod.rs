@@ -27,8 +27,7 @@ use serde::de::{Deserializer, MapAccess, Visitor};
 use crate::liberty::{CellFunction, Liberty};
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net, is_identifier};
 use cells::{FlipFlop, Placing};
-pub use error::YosysError;
-use error::in_words;
+pub use error::{CellFault, JsonFault, PinFault, YosysError};
 
 /// Most bytes of a file: a macropixel has 1.2 MB, a block a tenth of that.
 const MOST_BYTES: usize = 16 << 20;
@@ -156,7 +155,7 @@ impl Design {
         if text.len() > MOST_BYTES {
             return Err(YosysError::TooLong(text.len()));
         }
-        serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(in_words(&e)))
+        serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(JsonFault::new(&e)))
     }
 
     /// The module called `top`, or else the one that is marked as the top.
@@ -176,7 +175,7 @@ impl Design {
                 })?
             }
             None => match (&modules[..], modules.iter().find(|(_, of)| is_top(of))) {
-                ([], _) => return Err(YosysError::NoNetlist("it has no module".into())),
+                ([], _) => return Err(YosysError::NoNetlist(JsonFault::NoModule)),
                 ([only], _) | (_, Some(only)) => only,
                 _ => return Err(YosysError::NoTop(names())),
             },

@@ -195,7 +195,7 @@ impl Contract {
         if let Err(found) = paths.arrivals(&starts, &[]) {
             return Err(format!(
                 "{file}: module {name} has a loop of gates at {}, where time cannot be added up; break it with a flip-flop",
-                found.net
+                found.path
             ));
         }
         let (netlist, probes) = (&netlist, Probes::of_block(&netlist));
