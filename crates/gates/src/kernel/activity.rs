@@ -44,6 +44,29 @@ struct State {
 }
 
 /// Counts the activity of every net from some time on.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::{Activity, Drive, Kernel, Stimulus};
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+/// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+/// let drives = [(0, false), (1, true), (2, false)];
+/// let drives = drives.map(|(ns, level)| Drive::new(Time::from_ns(ns), a, level));
+/// let mut activity = Activity::new(&netlist, Time::ZERO);
+/// let mut kernel = Kernel::new(&netlist, &timing);
+/// kernel.run(&mut Stimulus::new(drives), Time::from_ns(3), &mut activity)?;
+/// // Z comes from X to 1, falls and rises.
+/// assert_eq!(activity.until(kernel.now())[z.index()].toggles, 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Activity {
     from: Time,

@@ -88,6 +88,26 @@ impl<O: Observer + ?Sized> Observer for &mut O {
 }
 
 /// Keeps every change of a few nets.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+/// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+/// let mut recorder = Recorder::new([z]);
+/// let mut stimulus = Stimulus::new([Drive::new(Time::from_ns(1), a, true)]);
+/// Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(2), &mut recorder)?;
+/// assert_eq!(recorder.falling_edges(z), [Time::from_fs(1_018_979)]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Recorder {
     nets: Vec<NetId>,

@@ -157,6 +157,30 @@ impl Kernel {
     ///
     /// # Errors
     /// When a loop of cells without delay oscillates within one instant.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::kernel::{Drive, Kernel, Stimulus};
+    /// use femtogate::logic::Logic;
+    /// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+    /// use femtogate::units::Time;
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+    /// let mut kernel = Kernel::new(&netlist, &timing);
+    /// assert_eq!(kernel.value(z), Logic::X);
+    ///
+    /// let mut stimulus = Stimulus::new([Drive::new(Time::from_ns(1), a, true)]);
+    /// kernel.run(&mut stimulus, Time::from_ns(2), &mut ())?;
+    /// assert_eq!(kernel.value(z), Logic::Zero);
+    /// assert_eq!(kernel.now(), Time::from_ns(2));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn run(
         &mut self,
         stimulus: &mut Stimulus<'_>,

@@ -90,6 +90,37 @@ pub(super) struct Found {
 }
 
 /// Judges every flip-flop of a netlist.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::{Drive, Kernel, Stimulus, TimingChecks};
+/// use femtogate::netlist::{
+///     CellKind, CheckKind, Corner, Library, ModuleBuilder, Netlist, Timing,
+/// };
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (d, ck, r, q) = (m.input("D"), m.input("CK"), m.input("R"), m.output("Q"));
+/// m.cell("bit", CellKind::Dffr, &[d, ck, r], &[Some(q), None]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let library = Library::generic_40nm();
+/// let timing = Timing::nominal(&netlist, &library, Corner::Typ);
+///
+/// // D rises a picosecond before CK.
+/// let [d, ck, r] = ["D", "CK", "R"].map(|name| netlist.net(name).unwrap());
+/// let low = [d, ck, r].map(|net| Drive::new(Time::ZERO, net, false));
+/// let rises = [(9_999, d), (10_000, ck)];
+/// let rises = rises.map(|(ps, net)| Drive::new(Time::from_ps(ps), net, true));
+/// let mut stimulus = Stimulus::new(low).with(rises);
+/// let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ);
+/// Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(20), &mut checks)?;
+///
+/// let report = checks.report(&netlist);
+/// assert_eq!(report.summary(CheckKind::Setup).violated, 1);
+/// assert_eq!(report.violations[0].cell, "top.bit");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct TimingChecks {
     pub(super) policy: Policy,
     pub(super) corner: Corner,

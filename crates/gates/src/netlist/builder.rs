@@ -226,6 +226,20 @@ impl ModuleBuilder {
     ///
     /// # Panics
     /// When `inputs` is empty.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{CellKind, ModuleBuilder};
+    ///
+    /// let mut m = ModuleBuilder::new("parity");
+    /// let word = m.input_bus("WORD", 8);
+    /// let odd = m.tree(CellKind::Xor2, &word);
+    /// let parity = m.output("PARITY");
+    /// m.gate_into(CellKind::Buf, &[odd], parity);
+    /// assert_eq!(m.finish()?.cells().len(), 7 + 1);
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn tree(&mut self, kind: CellKind, inputs: &[Net]) -> Net {
         assert!(!inputs.is_empty(), "a tree needs a leaf");
         let mut level = inputs.to_vec();
@@ -330,6 +344,20 @@ impl ModuleBuilder {
     /// # Errors
     /// The first mistake made: driver conflicts, undriven nets, wrong widths, unknown ports,
     /// duplicate or unusable names.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::ModuleBuilder;
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// m.output("Z");
+    /// let error = m.finish().unwrap_err();
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "module top: nothing drives net Z; connect an output to it or remove it"
+    /// );
+    /// ```
     pub fn finish(mut self) -> Result<Arc<Module>, NetlistError> {
         if let Some(net) = self.drivers.iter().position(Option::is_none) {
             let error = NetlistError::Undriven {

@@ -73,6 +73,28 @@ pub struct Netlist {
 
 impl Netlist {
     /// Flattens `top` and everything below it. The top scope is named after its module.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+    ///
+    /// let mut m = ModuleBuilder::new("inverter");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("gate", CellKind::Inv, &[a], &[z]);
+    /// let inverter = m.finish()?;
+    ///
+    /// let mut m = ModuleBuilder::new("pair");
+    /// let (a, between, z) = (m.input("A"), m.wire("BETWEEN"), m.output("Z"));
+    /// m.instance("first", &inverter, &[("A", &[a]), ("Z", &[between])]);
+    /// m.instance("second", &inverter, &[("A", &[between]), ("Z", &[z])]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    ///
+    /// assert_eq!((netlist.cells().len(), netlist.net_count()), (2, 3));
+    /// let gate = netlist.cell("second.gate").unwrap();
+    /// assert_eq!(netlist.cell_path(gate), "pair.second.gate");
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn elaborate(top: &Arc<Module>) -> Self {
         let mut netlist = Netlist {
             cells: Vec::with_capacity(top.total_cells()),
@@ -245,6 +267,24 @@ impl Netlist {
     }
 
     /// The net at a dotted path below the top; one bit of a bus as `path.BUS[3]`.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output_bus("Z", 2));
+    /// m.gate_into(CellKind::Buf, &[a], z[0]);
+    /// m.gate_into(CellKind::Inv, &[a], z[1]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    ///
+    /// let bit = netlist.net("Z[1]").unwrap();
+    /// assert_eq!(netlist.net_path(bit).unwrap(), "top.Z[1]");
+    /// assert_eq!(netlist.net("Z"), None); // A bus has several nets.
+    /// assert_eq!(netlist.signal("Z").unwrap()[1], bit);
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn net(&self, path: &str) -> Option<NetId> {
         if let Some((bus, index)) = path.strip_suffix(']').and_then(|p| p.rsplit_once('[')) {
             return self.signal(bus)?.get(index.parse::<usize>().ok()?).copied();

@@ -160,6 +160,29 @@ impl<'n> StaticTiming<'n> {
     ///
     /// # Errors
     /// When edges come back to where they were without meeting a barrier.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{
+    ///     CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+    /// };
+    /// use femtogate::units::Time;
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    ///
+    /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+    /// let analysis = StaticTiming::new(&netlist, &timing);
+    /// let arrivals = analysis.arrivals(&[(a, Edge::Rise)], &[])?;
+    /// let falls = Time::from_fs(18_979);
+    /// assert_eq!(arrivals.edge_window(z, Edge::Fall), Some((falls, falls)));
+    /// assert_eq!(arrivals.edge_window(z, Edge::Rise), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn arrivals(
         &self,
         starts: &[(NetId, Edge)],
@@ -311,6 +334,27 @@ impl Arrivals<'_> {
     }
 
     /// The path to the earliest or latest change of `net` in the direction of `edge`.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{
+    ///     Bound, CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+    /// };
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    ///
+    /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+    /// let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(a, Edge::Rise)], &[])?;
+    /// let path = arrivals.path(z, Edge::Fall, Bound::Longest).unwrap();
+    /// assert_eq!(path.steps[0].net, a);
+    /// assert_eq!(path.steps[1].arc.as_deref(), Some("top.inverter INV A"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn path(&self, net: NetId, edge: Edge, bound: Bound) -> Option<Path> {
         let arrivals = match bound {
             Bound::Shortest => &self.shortest,

@@ -29,6 +29,29 @@ pub struct Timing {
 
 impl Timing {
     /// Every cell as the library has it in this corner, or with the delay that is its own.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{
+    ///     CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+    /// };
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    ///
+    /// let library = Library::generic_40nm();
+    /// let [fast, slow] = [Corner::Fast, Corner::Slow].map(|corner| {
+    ///     let timing = Timing::nominal(&netlist, &library, corner);
+    ///     let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(a, Edge::Rise)], &[]);
+    ///     arrivals.unwrap().window(z).unwrap()
+    /// });
+    /// assert!(fast.1 < slow.0);
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn nominal(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
         Self::nominal_as(netlist, library, corner, |cell| netlist.cell_path(cell))
     }

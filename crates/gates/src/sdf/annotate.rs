@@ -39,6 +39,33 @@ const LONGEST_ARC: &str = "arcs with several delays, of which the longest is use
 /// # Errors
 /// Unknown instances, cell types and pins, wires between pins that are not connected, and sums that are
 /// negative or beyond 4.29 µs: line, reason and cure. `timing` is then only partly annotated.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::netlist::{
+///     CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+/// };
+/// use femtogate::sdf::{Sdf, annotate};
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+/// let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+///
+/// let text = r#"(DELAYFILE (SDFVERSION "3.0") (TIMESCALE 1ps)
+///   (CELL (CELLTYPE "INV") (INSTANCE inverter)
+///     (DELAY (ABSOLUTE (IOPATH A Z (60.0) (50.0)))))
+/// )"#;
+/// let sdf = Sdf::parse("layout.sdf", text)?;
+/// assert_eq!(annotate(&mut timing, &netlist, &sdf, Corner::Typ)?.arcs, 1);
+/// let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(a, Edge::Rise)], &[])?;
+/// assert_eq!(arrivals.window(z).unwrap().1, Time::from_ps(50));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn annotate(
     timing: &mut Timing,
     netlist: &Netlist,

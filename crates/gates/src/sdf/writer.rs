@@ -58,6 +58,27 @@ pub struct SdfOptions {
 ///
 /// # Errors
 /// Those of the writer.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::sdf::{Sdf, SdfOptions, write_sdf};
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let library = Library::generic_40nm();
+/// let corners = Corner::ALL.map(|corner| Timing::nominal(&netlist, &library, corner));
+/// let mut text = Vec::new();
+/// write_sdf(&mut text, &netlist, corners.each_ref(), SdfOptions::default())?;
+///
+/// let text = String::from_utf8(text)?;
+/// let sdf = Sdf::parse("top.sdf", &text)?;
+/// assert_eq!((sdf.cells.len(), &*sdf.cells[0].cell_type), (1, "INV"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_sdf(
     out: &mut dyn Write,
     netlist: &Netlist,

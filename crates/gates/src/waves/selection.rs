@@ -9,6 +9,26 @@ use std::io;
 use crate::netlist::Netlist;
 
 /// What part of the hierarchy to dump. Starts as [`Selection::all`] and is narrowed from there.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+/// use femtogate::units::Time;
+/// use femtogate::waves::{Selection, VcdWriter};
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let whole = VcdWriter::new(Vec::new(), &netlist, &Selection::all())?;
+/// let text = String::from_utf8(whole.finish(Time::from_ns(1))?)?;
+/// assert!(text.contains("$scope module top $end"));
+///
+/// let nowhere = Selection::all().below("nowhere");
+/// assert!(VcdWriter::new(Vec::new(), &netlist, &nowhere).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Selection {
     below: Vec<String>,

@@ -125,6 +125,28 @@ impl Module {
     /// # Errors
     /// Text that is no such netlist, modules that there are not or among which none is the top, cells that have no counterpart
     /// here, nets that nothing or more than one cell drives, names that are no identifiers.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::Module;
+    ///
+    /// let text = r#"{"modules": {"top": {
+    ///   "ports": {
+    ///     "A": {"direction": "input", "bits": [2]},
+    ///     "Y": {"direction": "output", "bits": [3]}
+    ///   },
+    ///   "cells": {
+    ///     "$1": {"type": "$_NOT_", "connections": {"A": [2], "Y": [3]}}
+    ///   }
+    /// }}}"#;
+    /// let top = Module::from_yosys(text, None)?;
+    /// assert_eq!((top.name(), top.cells().len()), ("top", 1));
+    ///
+    /// let error = Module::from_yosys(text, Some("counter")).unwrap_err();
+    /// assert_eq!(error.to_string(), "has no module counter; give top");
+    /// # Ok::<(), femtogate::yosys::YosysError>(())
+    /// ```
     pub fn from_yosys(text: &str, top: Option<&str>) -> Result<Arc<Self>, YosysError> {
         Design::from_json(text)?.build(top)
     }
