@@ -12,7 +12,7 @@ use crate::liberty::{
     CharacterisedNetlist, Clocking, write_constraints, write_mapped, write_mapped_cells,
     write_mapped_sdf,
 };
-use crate::netlist::Netlist;
+use crate::netlist::{Netlist, ScopeId};
 
 /// Arguments of `gdtof export sdc`.
 #[derive(Args)]
@@ -107,7 +107,7 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
     })?;
     mapped.write_sdc(&file("mapped.sdc"))?;
     notes(set.commit(config)?);
-    let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, 0);
+    let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, ScopeId::TOP);
     say_unless_quiet(format_args!(
         "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0} um2, leakage {:.3} nW\n",
         folder.display(),

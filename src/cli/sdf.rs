@@ -16,6 +16,7 @@ use crate::sdf::{
     Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, SkippedEntry, annotate,
     oddities, write_library_sdf, write_sdf,
 };
+use crate::units::Time;
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Divider {
@@ -165,10 +166,10 @@ pub(super) fn annotated_timing(
     for skipped in sdf.skipped.iter().chain(&result.notes) {
         note(skipped_line(skipped));
     }
-    if result.longest_wire_to_d_fs > 0 {
+    if result.longest_wire_to_d > Time::ZERO {
         note(format_args!(
             "the longest wire to D left out is {} fs",
-            result.longest_wire_to_d_fs
+            result.longest_wire_to_d.as_fs()
         ));
     }
     let corner = config.corner;

@@ -9,7 +9,7 @@ use super::point::{Candidate, ChipDesign, DesignPoint, Limit};
 use crate::analysis::TimingVerdict;
 use crate::chip::{CellLibrary, EventType, Mode, Sensor, SensorConfig, Silicon, Tdc, macropixel};
 use crate::files::InputError;
-use crate::netlist::Netlist;
+use crate::netlist::{Netlist, ScopeId};
 use crate::scene::{Emission, EyeRule, Object, Scene, Shape, Train};
 use crate::theory::design::share_inside;
 use crate::theory::partial::largest_mean;
@@ -196,7 +196,7 @@ impl Problem {
             Some(library) => {
                 let netlist = Netlist::elaborate(&circuit);
                 let placed = library.characterised(&netlist);
-                placed.silicon(&netlist, &library.liberty, 0).0
+                placed.silicon(&netlist, &library.liberty, ScopeId::TOP).0
             }
         };
         known().insert(key, area);

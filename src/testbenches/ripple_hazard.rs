@@ -28,7 +28,7 @@ use crate::engine::waveform::write_waves;
 use crate::files::InputError;
 use crate::kernel::{CheckReport, Policy, Recorder};
 use crate::logic::Logic;
-use crate::netlist::{CheckKind, Corner, Mismatch, NetId, Netlist, Timing, varied};
+use crate::netlist::{CheckKind, Corner, Mismatch, NetId, Netlist, ScopeId, Timing, varied};
 use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
@@ -114,7 +114,7 @@ fn delays(netlist: &Netlist) -> Timing {
     let mismatched = varied(netlist, &nominal, 1.0, Some(MISMATCH));
     let second = format!(".{}.", array::pixel_name(0, 1));
     let mut timing = nominal;
-    for cell in 0..netlist.cells().len() {
+    for cell in netlist.cells_below(ScopeId::TOP) {
         if netlist.cell_path(cell).contains(&second) {
             timing.set(cell, *mismatched.cell_delays(cell));
         }

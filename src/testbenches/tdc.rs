@@ -21,7 +21,7 @@ use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
 use crate::files::InputError;
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Netlist, Timing};
+use crate::netlist::{CellId, CellKind, Netlist, Timing};
 use crate::report::{Axis, Chart, Checks, Grid};
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
@@ -146,7 +146,7 @@ impl Tdc {
             .filter(|(_, cell)| cell.kind == CellKind::Inv);
         let (inverter, _) = inverters.next().expect("it inverts CLK");
         let late = Time::from_fs(
-            self.timing.cell_delays(inverter)[0][0]
+            self.timing.cell_delays(CellId::new(inverter))[0][0]
                 .delay_fs(Logic::One)
                 .into(),
         );

@@ -7,7 +7,7 @@ use guided_dtof::analysis::{
 };
 use guided_dtof::chip::{Limits, PCounter, SensorConfig, Silicon, Tap};
 use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{CellKind, Corner, Library, Mismatch};
+use guided_dtof::netlist::{CellId, CellKind, Corner, Library, Mismatch, ScopeId};
 use guided_dtof::units::Time;
 
 const SLOW: Time = Time::from_ns(20);
@@ -235,15 +235,15 @@ fn every_flip_flop_of_the_chip_is_asked() {
         .chain(&paths.hits)
         .chain(&local.counts)
         .chain(&local.toggles);
-    let asked: Vec<usize> = asked
+    let asked: Vec<CellId> = asked
         .filter(|r| r.kind.concerns_data())
         .map(|r| r.cell)
         .collect();
-    let left_out = |netlist: &guided_dtof::netlist::Netlist, asked: &[usize]| -> Vec<String> {
-        let cells = netlist.cells().iter().enumerate();
+    let left_out = |netlist: &guided_dtof::netlist::Netlist, asked: &[CellId]| -> Vec<String> {
+        let cells = netlist.cells_below(ScopeId::TOP).zip(netlist.cells());
         let flip_flops = cells.filter(|(_, c)| c.kind.is_flip_flop());
-        let unasked = flip_flops.filter(|(index, _)| !asked.contains(index));
-        unasked.map(|(index, _)| netlist.cell_path(index)).collect()
+        let unasked = flip_flops.filter(|(cell, _)| !asked.contains(cell));
+        unasked.map(|(cell, _)| netlist.cell_path(cell)).collect()
     };
     for cell in left_out(&paths.netlist, &asked) {
         // Samplers of SPADs, of ENABLE by STOP, and what LOAD_CLK and READ_CLK move.
@@ -259,7 +259,7 @@ fn every_flip_flop_of_the_chip_is_asked() {
         assert!(known.iter().any(|name| cell.contains(name)), "{cell}");
     }
     let load = LoadTiming::analyse(&config, &TYPICAL, Limits::Kept);
-    let asked: Vec<usize> = load.load_clk.iter().map(|r| r.cell).collect();
+    let asked: Vec<CellId> = load.load_clk.iter().map(|r| r.cell).collect();
     // The first stage takes its bit from the tester.
     let left = left_out(&load.netlist, &asked);
     assert!(
@@ -268,7 +268,7 @@ fn every_flip_flop_of_the_chip_is_asked() {
         "{left:?}"
     );
     let read = ReadTiming::analyse(&config, &TYPICAL, Limits::Kept);
-    let asked: Vec<usize> = read.read_clk.iter().map(|r| r.cell).collect();
+    let asked: Vec<CellId> = read.read_clk.iter().map(|r| r.cell).collect();
     assert_eq!(left_out(&read.netlist, &asked), [""; 0]);
 }
 

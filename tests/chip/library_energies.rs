@@ -4,7 +4,7 @@ use crate::library_chips;
 use crate::tool;
 
 use guided_dtof::liberty::{CharacterisedNetlist, Environment, Liberty, write_mapped};
-use guided_dtof::netlist::{CellKind, ModuleBuilder, Netlist};
+use guided_dtof::netlist::{CellKind, ModuleBuilder, Netlist, ScopeId};
 
 /// OpenSTA 2.0.17 charges both energies, of rise and fall, at every change; we charge one of them, on average.
 #[test]
@@ -42,7 +42,7 @@ fn of_a_chain_by_opensta() {
             .split_whitespace();
         let theirs: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
         let volt = library.conditions[0].unwrap();
-        let [within, loads] = made.energy_j((&netlist, 0), &library, volt, |_| 1.0);
+        let [within, loads] = made.energy_j((&netlist, ScopeId::TOP), &library, volt, |_| 1.0);
         // We take the mean of a pin's two slews and of its two capacitances: 0.6 % and 0.2 % at most.
         for (ours, theirs, apart) in [(2.0 * within, theirs[0], 1e-2), (loads, theirs[1], 5e-3)] {
             assert!(

@@ -293,22 +293,20 @@ fn captured(
             .map(|&t| t - origin)
             .collect(),
         events: found.map(|e| e.kind).collect(),
-        violations: violations
-            .map(|v| (v.kind, Time::from_fs(v.time_fs) - origin))
-            .collect(),
+        violations: violations.map(|v| (v.kind, v.time - origin)).collect(),
     }
 }
 
 fn shortened(netlist: &Netlist, factor: f64) -> Timing {
     let mut timing = Timing::nominal(netlist, &Library::generic_40nm(), Corner::Typ);
-    for index in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
-        if netlist.cells()[index].kind == CellKind::Buf {
-            let mut delays = *timing.cell_delays(index);
+    for cell in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
+        if netlist.cells()[cell.index()].kind == CellKind::Buf {
+            let mut delays = *timing.cell_delays(cell);
             for arc in delays.as_flattened_mut() {
                 arc.rise_fs = (arc.rise_fs as f64 * factor) as u32;
                 arc.fall_fs = (arc.fall_fs as f64 * factor) as u32;
             }
-            timing.set(index, delays);
+            timing.set(cell, delays);
         }
     }
     timing

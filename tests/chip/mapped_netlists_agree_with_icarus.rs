@@ -26,7 +26,7 @@ use guided_dtof::analysis::TimingVerdict;
 use guided_dtof::chip::{Exposure, PCounter, Probe, Silicon};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
-use guided_dtof::netlist::{Direction, NetId};
+use guided_dtof::netlist::{Direction, NetId, ScopeId};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -125,7 +125,7 @@ fn compare(mapped: &MappedChip, seed: u64) -> (usize, usize) {
     });
     let theirs: BTreeMap<String, Edges> = theirs.collect();
 
-    let slowest = (0..mapped.netlist.cells().len()).flat_map(|cell| {
+    let slowest = mapped.netlist.cells_below(ScopeId::TOP).flat_map(|cell| {
         let arcs = timing.cell_delays(cell).as_flattened().iter();
         arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
             .collect::<Vec<_>>()

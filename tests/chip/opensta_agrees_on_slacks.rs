@@ -30,8 +30,8 @@ use std::collections::BTreeMap;
 
 use guided_dtof::chip::{Probe, Probes};
 use guided_dtof::netlist::{
-    Arrivals, CheckKind, Control, Corner, Edge, Library, NetId, Requirements, StaticTiming,
-    derated_limits,
+    Arrivals, CheckKind, Control, Corner, Edge, Library, NetId, Requirements, ScopeId,
+    StaticTiming, derated_limits,
 };
 
 const COMMANDS: &str = "source mapped.sdc
@@ -228,7 +228,7 @@ fn ours(mapped: &MappedChip) -> Checks {
     let ns = |time: guided_dtof::units::Time| time.as_fs() as f64 * 1e-6;
     for requirement in all.all() {
         let (kind, edge) = (requirement.kind, requirement.edge);
-        let leaf = &netlist.cells()[requirement.cell];
+        let leaf = &netlist.cells()[requirement.cell.index()];
         let limits = timing.limits(requirement.cell, leaf.kind);
         let limit = f64::from(limits.limit_fs(Control::Reset, kind, edge)) * 1e-6;
         let arrivals = all.arrivals(requirement.launch);
@@ -265,7 +265,7 @@ fn ours(mapped: &MappedChip) -> Checks {
     // A reset ends with the clocks of the flip-flops that it holds.
     let start = (netlist.net("STOP").unwrap(), Edge::Rise);
     let counter = Probes::p_counter_cells(netlist).into_iter();
-    let clocks = counter.map(|cell| netlist.cells()[cell].input(1));
+    let clocks = counter.map(|cell| netlist.cells()[cell.index()].input(1));
     let cuts: Vec<NetId> = nets(&["HIT", &Probe::Strobe.path("")])
         .into_iter()
         .chain(clocks)
@@ -277,9 +277,8 @@ fn ours(mapped: &MappedChip) -> Checks {
         (Launch::Stop, &stop),
     ];
     for (cell, leaf) in netlist
-        .cells()
-        .iter()
-        .enumerate()
+        .cells_below(ScopeId::TOP)
+        .zip(netlist.cells())
         .filter(|(_, leaf)| leaf.kind.is_flip_flop())
     {
         let limits = timing.limits(cell, leaf.kind);
@@ -322,9 +321,10 @@ fn ours(mapped: &MappedChip) -> Checks {
 /// Our flip-flop behind every input pin of its library cell.
 fn own_pins(mapped: &MappedChip) -> BTreeMap<String, String> {
     let mut pins = BTreeMap::new();
-    for (cell, leaf) in mapped.netlist.cells().iter().enumerate() {
+    let netlist = &mapped.netlist;
+    for (cell, leaf) in netlist.cells_below(ScopeId::TOP).zip(netlist.cells()) {
         if leaf.kind.is_flip_flop() {
-            let own = mapped.netlist.cell_path(cell);
+            let own = netlist.cell_path(cell);
             let path = own.replace('.', "__");
             for number in ["", "__0", "__1", "__2", "__3"] {
                 for pin in ["D", "CK", "CLK", "RN", "R", "SN", "S"] {

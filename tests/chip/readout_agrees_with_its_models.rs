@@ -17,7 +17,7 @@ use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::readout::{PinSampler, read_out, readout_netlist};
 use guided_dtof::kernel::{Drive, Kernel, Observer, Stimulus};
 use guided_dtof::logic::Logic;
-use guided_dtof::netlist::NetId;
+use guided_dtof::netlist::{NetId, ScopeId};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{VcdWriter, WaveSelection};
@@ -267,8 +267,8 @@ fn the_readout_causes_no_event_while_nothing_is_read() {
     };
     for (index, scope) in netlist.scopes().iter().enumerate() {
         if is_readout(&scope.name) {
-            for cell in netlist.cells_of(index) {
-                for net in netlist.cells()[cell].output_nets() {
+            for cell in netlist.cells_of(ScopeId::new(index)) {
+                for net in netlist.cells()[cell.index()].output_nets() {
                     nets[net.index()] = true;
                 }
             }

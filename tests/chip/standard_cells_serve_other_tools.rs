@@ -16,7 +16,7 @@ use std::process::Command;
 
 use guided_dtof::chip::{PCounter, SensorConfig, array, hslidar_delay_line, quantic4x4};
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::netlist::{CellKind, Corner, Library, Netlist, Timing};
+use guided_dtof::netlist::{CellKind, Corner, Library, Netlist, ScopeId, Timing};
 use guided_dtof::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
 use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
@@ -139,13 +139,13 @@ fn delays_are_written_without_elaborating_the_design() {
         for (corner, nominal) in Corner::ALL.into_iter().zip(&corners) {
             let mut timing = corners[1].clone();
             annotate(&mut timing, &netlist, &sdf, corner).unwrap();
-            for (index, cell) in netlist.cells().iter().enumerate() {
+            for (id, cell) in netlist.cells_below(ScopeId::TOP).zip(netlist.cells()) {
                 for (pin, output) in (0..cell.kind.inputs().len())
                     .flat_map(|pin| (0..cell.kind.outputs().len()).map(move |output| (pin, output)))
                 {
                     let [read, written] =
-                        [&timing, nominal].map(|t| t.cell_delays(index)[pin][output]);
-                    assert_eq!(read, written, "{}", netlist.cell_path(index));
+                        [&timing, nominal].map(|t| t.cell_delays(id)[pin][output]);
+                    assert_eq!(read, written, "{}", netlist.cell_path(id));
                 }
             }
         }

@@ -10,8 +10,8 @@ use guided_dtof::chip::{
 use guided_dtof::kernel::{Drive, Kernel, Observer, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
-    ArcDelay, CellKind, Corner, Edge, Library, Module, ModuleBuilder, NetId, Netlist, StaticTiming,
-    Timing,
+    ArcDelay, CellKind, Corner, Edge, Library, Module, ModuleBuilder, NetId, Netlist, ScopeId,
+    StaticTiming, Timing,
 };
 use guided_dtof::units::Time;
 use proptest::prelude::*;
@@ -128,7 +128,7 @@ proptest! {
         let netlist = Netlist::elaborate(&random_circuit(&choices));
         let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         let mut next = delays.iter().cycle();
-        for cell in 0..netlist.cells().len() {
+        for cell in netlist.cells_below(ScopeId::TOP) {
             let mut arc = || {
                 let &(rise_fs, fall_fs) = next.next().expect("endless");
                 ArcDelay { rise_fs, fall_fs }

@@ -7,7 +7,7 @@ use crate::analysis::{
     ripple, shortest_period,
 };
 use crate::chip::{CellLibrary, Limits, Probe, SensorConfig, Silicon, macropixel, p_counter};
-use crate::netlist::{CheckKind, Module, Netlist, Path, Requirement};
+use crate::netlist::{CellId, CheckKind, Module, Netlist, Path, Requirement};
 use crate::units::Time;
 
 /// Longest period that is tried.
@@ -265,7 +265,7 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming, read: &ReadTi
                 continue;
             };
             let slacks = of_kind.iter().filter_map(|r| slack(r));
-            let mut cells: Vec<usize> = of_kind.iter().map(|r| r.cell).collect();
+            let mut cells: Vec<CellId> = of_kind.iter().map(|r| r.cell).collect();
             cells.sort_unstable();
             cells.dedup();
             section.push([

@@ -44,6 +44,29 @@ struct State {
 }
 
 /// Counts the activity of every net from some time on.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::{Activity, Drive, Kernel, Stimulus};
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+/// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+/// let drives = [(0, false), (1, true), (2, false)];
+/// let drives = drives.map(|(ns, level)| Drive::new(Time::from_ns(ns), a, level));
+/// let mut activity = Activity::new(&netlist, Time::ZERO);
+/// let mut kernel = Kernel::new(&netlist, &timing);
+/// kernel.run(&mut Stimulus::new(drives), Time::from_ns(3), &mut activity)?;
+/// // Z comes from X to 1, falls and rises.
+/// assert_eq!(activity.until(kernel.now())[z.index()].toggles, 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Activity {
     from: Time,
@@ -152,7 +175,7 @@ mod tests {
     use super::*;
     use crate::kernel::{Drive, Kernel, Stimulus};
     use crate::netlist::{
-        ArcDelay, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, Timing,
+        ArcDelay, CellId, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, Timing,
     };
     use Logic::{One, X, Zero};
 
@@ -244,7 +267,10 @@ mod tests {
             rise_fs: 500_000,
             fall_fs: 500_000,
         };
-        timing.set(nand.unwrap(), [[slow; MAX_OUTPUTS]; MAX_INPUTS]);
+        timing.set(
+            CellId::new(nand.unwrap()),
+            [[slow; MAX_OUTPUTS]; MAX_INPUTS],
+        );
         assert_eq!(run(&timing), ((20, [0, 0]), (0, [0, 20])));
     }
 }

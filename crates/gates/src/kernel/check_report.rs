@@ -6,28 +6,29 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
-
 use crate::netlist::{CheckKind, Corner, Edge};
 use crate::units::Time;
 
-/// Width of a slack bin, fs.
-pub const BIN_FS: i64 = 10_000;
-/// Lower edge of the first slack bin, fs.
-pub const FIRST_BIN_FS: i64 = -100_000;
+/// Width of a slack bin.
+pub const BIN_WIDTH: Time = Time::from_ps(10);
+/// Lower edge of the first slack bin.
+pub const FIRST_BIN: Time = Time::from_ps(-100);
 /// Slack bins.
 pub const BINS: usize = 50;
 
 /// The bin of a slack.
 #[inline]
 pub(super) fn slack_bin(slack_fs: i64) -> usize {
-    let slack_fs = slack_fs.clamp(FIRST_BIN_FS, FIRST_BIN_FS + BIN_FS * BINS as i64 - 1);
-    ((slack_fs - FIRST_BIN_FS) / BIN_FS) as usize
+    const FIRST_FS: i64 = FIRST_BIN.as_fs();
+    const WIDTH_FS: i64 = BIN_WIDTH.as_fs();
+    let slack_fs = slack_fs.clamp(FIRST_FS, FIRST_FS + WIDTH_FS * BINS as i64 - 1);
+    ((slack_fs - FIRST_FS) / WIDTH_FS) as usize
 }
 
 /// What a violation does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Policy {
     /// It is reported.
@@ -42,7 +43,8 @@ pub enum Policy {
 }
 
 /// A limit that was broken.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Violation {
     /// Which limit.
     pub kind: CheckKind,
@@ -53,29 +55,35 @@ pub struct Violation {
     /// Direction in which that pin changed: D's for setup and hold, the release for recovery and removal, the
     /// end of the pulse for widths.
     pub edge: Edge,
-    /// The event that completed it, fs.
-    pub time_fs: i64,
-    /// Distance less limit, fs; negative.
-    pub slack_fs: i64,
+    /// The event that completed it.
+    #[cfg_attr(feature = "serde", serde(rename = "time_fs"))]
+    pub time: Time,
+    /// Distance less limit; negative.
+    #[cfg_attr(feature = "serde", serde(rename = "slack_fs"))]
+    pub slack: Time,
     /// Whether the flip-flop samples an asynchronous signal, so that this is by design.
     pub is_asynchronous: bool,
 }
 
 /// Where and when a slack was smallest.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SlackLocation {
     /// Dotted path of the flip-flop.
     pub cell: String,
     /// The pin measured against CK, or whose pulse it is.
     pub pin: String,
-    /// The event that completed the check, fs.
-    pub time_fs: i64,
-    /// Distance less limit, fs.
-    pub slack_fs: i64,
+    /// The event that completed the check.
+    #[cfg_attr(feature = "serde", serde(rename = "time_fs"))]
+    pub time: Time,
+    /// Distance less limit.
+    #[cfg_attr(feature = "serde", serde(rename = "slack_fs"))]
+    pub slack: Time,
 }
 
 /// All checks of one kind.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CheckSummary {
     /// Which.
     pub kind: CheckKind,
@@ -89,19 +97,21 @@ pub struct CheckSummary {
     pub asynchronous_violated: u64,
     /// The first smallest slack, asynchronous samplers left out; none if nothing was checked.
     pub worst: Option<SlackLocation>,
-    /// Slacks by bin ([`BINS`] of [`BIN_FS`] from [`FIRST_BIN_FS`]), asynchronous samplers left out.
+    /// Slacks by bin ([`BINS`] of [`BIN_WIDTH`] from [`FIRST_BIN`]), asynchronous samplers left out.
     pub histogram: Vec<u64>,
 }
 
 /// Everything that was found.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CheckReport {
     /// What violations did.
     pub policy: Policy,
     /// Corner of the limits.
     pub corner: Corner,
-    /// Nothing before this was judged, fs; none if everything was.
-    pub not_before_fs: Option<i64>,
+    /// Nothing before this was judged; none if everything was.
+    #[cfg_attr(feature = "serde", serde(rename = "not_before_fs"))]
+    pub not_before: Option<Time>,
     /// Flip-flops that were watched.
     pub flip_flops: usize,
     /// Of these, samplers of asynchronous signals.
@@ -147,9 +157,9 @@ impl fmt::Display for CheckReport {
         )?;
         for s in &self.summaries {
             let worst = s.worst.as_ref();
-            let slack = worst.map_or("-".to_owned(), |p| Time::from_fs(p.slack_fs).to_string());
+            let slack = worst.map_or("-".to_owned(), |p| p.slack.to_string());
             let place = worst.map_or(String::new(), |p| {
-                format!("  {}.{} at {}", p.cell, p.pin, Time::from_fs(p.time_fs))
+                format!("  {}.{} at {}", p.cell, p.pin, p.time)
             });
             writeln!(
                 f,

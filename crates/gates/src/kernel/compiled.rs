@@ -5,7 +5,8 @@
 
 use crate::logic::Logic;
 use crate::netlist::{
-    ArcDelay, CellDelays, CellKind, FlatCell, MAX_INPUTS, NetId, Netlist, Timing, next_state,
+    ArcDelay, CellDelays, CellId, CellKind, FlatCell, MAX_INPUTS, NetId, Netlist, Timing,
+    next_state,
 };
 
 /// One entry of a net's fan-out: cell and pin in one word.
@@ -109,7 +110,7 @@ impl DelaySet {
         let mut all: Vec<Self> = sets.iter().map(|set| to_output(set, 0)).collect();
         let mut have_two = vec![false; sets.len()];
         for (index, cell) in netlist.cells().iter().enumerate() {
-            have_two[timing.set_of(index) as usize] |= cell.kind.outputs().len() > 1;
+            have_two[timing.set_of(CellId::new(index)) as usize] |= cell.kind.outputs().len() > 1;
         }
         let places = (0..).zip(sets).map(|(first, set)| {
             let second = to_output(set, 1);
@@ -262,7 +263,7 @@ pub(super) fn initial_cells(
                 is_dirty: false,
                 data: number(cell.inputs[0]),
                 clock: number(cell.inputs[CLOCK]),
-                delays: delays[timing.set_of(index) as usize],
+                delays: delays[timing.set_of(CellId::new(index)) as usize],
                 outputs: cell.outputs.map(number),
             }
         })
@@ -282,7 +283,7 @@ mod tests {
         m.gate(CellKind::Mux2, &[a, b, s]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
-        let set = DelaySet::all(&netlist, &timing).0[timing.set_of(0) as usize];
+        let set = DelaySet::all(&netlist, &timing).0[timing.set_of(CellId::new(0)) as usize];
         let arc =
             |pin: usize| library.arcs(CellKind::Mux2)[pin][0].delay_fs(Corner::Typ, Logic::One);
         let by_pins = |differing: u8| set.shortest_delays(differing, 0)[Logic::One as usize];

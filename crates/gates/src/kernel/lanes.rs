@@ -22,7 +22,7 @@ use super::lane_word::Lanes;
 use super::oscillation::{MOST_DELTA_CYCLES, Oscillation};
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, DelayModel, MAX_INPUTS, NetId, Netlist, Timing};
+use crate::netlist::{CellId, CellKind, DelayModel, MAX_INPUTS, NetId, Netlist, Timing};
 use crate::units::Time;
 
 /// Some lanes of one input take a value at one time.
@@ -96,6 +96,38 @@ struct ClockEdge {
 }
 
 /// An event-driven simulation of up to 64 copies of one netlist.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::{LaneDrive, LaneKernel, Lanes};
+/// use femtogate::logic::Logic;
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+/// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+/// // Every lane starts at 0; lane 1 rises a nanosecond later.
+/// let drives = [(0, u64::MAX, Logic::Zero), (1, 0b10, Logic::One)];
+/// let mut stimulus = drives
+///     .into_iter()
+///     .map(|(ns, mask, value)| LaneDrive {
+///         time: Time::from_ns(ns),
+///         net: a,
+///         mask,
+///         values: Lanes::all(value),
+///     })
+///     .peekable();
+/// let mut kernel = LaneKernel::new(&netlist, &timing);
+/// kernel.run(&mut stimulus, Time::from_ns(2), &mut ())?;
+/// assert_eq!(kernel.value(z).lane(0), Logic::One);
+/// assert_eq!(kernel.value(z).lane(1), Logic::Zero);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct LaneKernel {
     now_fs: i64,
     nets: Vec<NetState>,
@@ -132,10 +164,10 @@ impl LaneKernel {
             .map(|(i, cell)| CellState {
                 kind: cell.kind,
                 is_dirty: false,
-                model: timing.model(i),
+                model: timing.model(CellId::new(i)),
                 inputs: cell.inputs.map(index),
                 outputs: cell.outputs.map(index),
-                delays: places[timing.set_of(i) as usize],
+                delays: places[timing.set_of(CellId::new(i)) as usize],
                 changed: [0; MAX_INPUTS],
                 state: unknown,
             });

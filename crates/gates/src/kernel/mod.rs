@@ -39,7 +39,7 @@ mod wheel;
 
 pub use activity::{Activity, NetActivity};
 pub use check_report::{
-    BIN_FS, BINS, CheckReport, CheckSummary, FIRST_BIN_FS, Policy, SlackLocation, Violation,
+    BIN_WIDTH, BINS, CheckReport, CheckSummary, FIRST_BIN, Policy, SlackLocation, Violation,
 };
 pub use lane_word::{LANES, Lanes};
 pub use lanes::{LaneDrive, LaneKernel, LaneObserver};

@@ -1,7 +1,7 @@
 //! Who watches the simulation: anything that wants to hear of every value change.
 
 use crate::logic::Logic;
-use crate::netlist::NetId;
+use crate::netlist::{CellId, NetId};
 use crate::units::Time;
 
 /// Hears of every net change, in time order. The kernel takes it as `dyn`, so that only its own crate compiles it, as optimised as that is: a
@@ -10,10 +10,10 @@ pub trait Observer {
     /// `net` took `value` at `time`.
     fn change(&mut self, time: Time, net: NetId, value: Logic);
 
-    /// A flip-flop (index of its cell) whose state is in doubt. The kernel asks after every instant, and makes
+    /// A flip-flop whose state is in doubt. The kernel asks after every instant, and makes
     /// the state unknown, until there is none. An observer that only watches leaves this as it is, at no cost.
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         None
     }
 
@@ -49,7 +49,7 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
 
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         self.0.doubtful().or_else(|| self.1.doubtful())
     }
 
@@ -72,7 +72,7 @@ impl<O: Observer + ?Sized> Observer for &mut O {
     }
 
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         (**self).doubtful()
     }
 
@@ -88,6 +88,26 @@ impl<O: Observer + ?Sized> Observer for &mut O {
 }
 
 /// Keeps every change of a few nets.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+/// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+/// let mut recorder = Recorder::new([z]);
+/// let mut stimulus = Stimulus::new([Drive::new(Time::from_ns(1), a, true)]);
+/// Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(2), &mut recorder)?;
+/// assert_eq!(recorder.falling_edges(z), [Time::from_fs(1_018_979)]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Recorder {
     nets: Vec<NetId>,

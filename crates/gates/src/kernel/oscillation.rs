@@ -22,8 +22,8 @@ mod tests {
     use crate::kernel::{Drive, Kernel, LaneDrive, LaneKernel, Lanes, Stimulus};
     use crate::logic::Logic;
     use crate::netlist::{
-        ArcDelay, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, Netlist,
-        Timing,
+        ArcDelay, CellId, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder,
+        Netlist, Timing,
     };
     use crate::units::Time;
 
@@ -38,7 +38,7 @@ mod tests {
             rise_fs: 0,
             fall_fs: 0,
         };
-        timing.set(0, [[nothing; MAX_OUTPUTS]; MAX_INPUTS]);
+        timing.set(CellId::new(0), [[nothing; MAX_OUTPUTS]; MAX_INPUTS]);
         let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
         let drives = [(1, false), (3, true)].map(|(ns, value)| (Time::from_ns(ns), value));
 

@@ -16,7 +16,7 @@
 //! flip-flops, a tenth of it so.
 
 use super::compiled::CLOCK;
-use crate::netlist::{CellKind, DelayModel, FlatCell, Netlist, Timing};
+use crate::netlist::{CellId, CellKind, DelayModel, FlatCell, Netlist, Timing};
 
 /// Stages below which words gain nothing; and METDCs of any size stay as they are.
 const FEWEST: usize = 65;
@@ -69,13 +69,13 @@ impl ShiftBank {
                 return false;
             };
             let is_plain = cell.kind == CellKind::Dffr && !is_watched[q.index()];
-            is_plain && timing.model(index) == DelayModel::Inertial
+            is_plain && timing.model(CellId::new(index)) == DelayModel::Inertial
         };
         let follows = |before: usize, after: usize| {
             let (a, b) = (&cells[before], &cells[after]);
             may_be(before)
                 && a.inputs[CLOCK..=RESET] == b.inputs[CLOCK..=RESET]
-                && timing.set_of(before) == timing.set_of(after)
+                && timing.set_of(CellId::new(before)) == timing.set_of(CellId::new(after))
                 && a.outputs[0] < b.outputs[0]
         };
         let mut next = vec![NOBODY; cells.len()];
@@ -110,7 +110,7 @@ impl ShiftBank {
                 .iter()
                 .filter_map(|&index| Some(cell(index).outputs[0]?.index() as u32))
                 .collect(),
-            delays: timing.set_of(chain[0]),
+            delays: timing.set_of(CellId::new(chain[0])),
             state: words.clone(),
             shown: words,
             is_formed: false,
@@ -224,7 +224,7 @@ mod tests {
         let netlist = Netlist::elaborate(&m.finish().expect("a register"));
         let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
         if own == Own::Wire {
-            timing.set_model(odd, DelayModel::Transport);
+            timing.set_model(CellId::new(odd), DelayModel::Transport);
         }
         let net = |name: &str| netlist.net(name).expect("a net").index() as u32;
         let banks = ShiftBank::all(&netlist, &timing).into_iter().map(|bank| {

@@ -12,7 +12,7 @@ use super::stimulus::Stimulus;
 use super::transport::TransportQueues;
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
-use crate::netlist::{NetId, Netlist, Timing};
+use crate::netlist::{CellId, NetId, Netlist, Timing};
 use crate::units::Time;
 
 /// No value is pending on a net.
@@ -157,6 +157,30 @@ impl Kernel {
     ///
     /// # Errors
     /// When a loop of cells without delay oscillates within one instant.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::kernel::{Drive, Kernel, Stimulus};
+    /// use femtogate::logic::Logic;
+    /// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+    /// use femtogate::units::Time;
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+    /// let mut kernel = Kernel::new(&netlist, &timing);
+    /// assert_eq!(kernel.value(z), Logic::X);
+    ///
+    /// let mut stimulus = Stimulus::new([Drive::new(Time::from_ns(1), a, true)]);
+    /// kernel.run(&mut stimulus, Time::from_ns(2), &mut ())?;
+    /// assert_eq!(kernel.value(z), Logic::Zero);
+    /// assert_eq!(kernel.now(), Time::from_ns(2));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn run(
         &mut self,
         stimulus: &mut Stimulus<'_>,
@@ -193,7 +217,7 @@ impl Kernel {
             self.settle(observer)?;
             while let Some(cell) = observer.doubtful() {
                 self.give_all_values();
-                self.corrupt(cell);
+                self.corrupt(cell.index());
             }
         }
         self.now_fs = self.now_fs.max(until_fs);
@@ -228,14 +252,14 @@ impl Kernel {
         self.schedule(outputs[1], inverted, &to_qn, &mut ());
     }
 
-    /// Gives flip-flops (index of their cell) another state and lets everything that follows from it follow, without time
+    /// Gives flip-flops another state and lets everything that follows from it follow, without time
     /// passing and without a clock edge: the netlist afterwards is as if they had come by it earlier. `observer` hears
     /// of the nets that changed.
     ///
     /// Only at rest: no change may be on its way, and what follows must not reach a reset or set.
     pub fn preset(
         &mut self,
-        states: impl IntoIterator<Item = (usize, bool)>,
+        states: impl IntoIterator<Item = (CellId, bool)>,
         observer: &mut dyn Observer,
     ) {
         debug_assert!(
@@ -244,6 +268,7 @@ impl Kernel {
         );
         let mut changes: Vec<(u32, u8)> = Vec::new();
         for (cell, state) in states {
+            let cell = cell.index();
             self.dissolve_bank_of(cell);
             let cell = &mut self.cells[cell];
             debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");

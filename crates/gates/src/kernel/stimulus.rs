@@ -114,6 +114,19 @@ impl Iterator for Stimulus<'_> {
 
 /// A clock's edges for half periods `first..end` counted from `origin`: even ones fall, odd ones
 /// rise, none with an error that adds up.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::clock;
+/// use femtogate::netlist::NetId;
+/// use femtogate::units::{Frequency, Time};
+///
+/// // Half a period of 384 MHz is 1302083 1/3 fs.
+/// let edges = clock(NetId::new(0), Frequency::from_hz(384_000_000), Time::ZERO, 0, 4);
+/// let times: Vec<i64> = edges.map(|drive| drive.time.as_fs()).collect();
+/// assert_eq!(times, [0, 1_302_083, 2_604_167, 3_906_250]);
+/// ```
 pub fn clock(
     net: NetId,
     frequency: Frequency,

@@ -39,7 +39,7 @@ use super::check_report::{BINS, CheckReport, CheckSummary, Policy, SlackLocation
 use super::observer::Observer;
 use crate::logic::Logic;
 use crate::netlist::{
-    CellKind, CheckKind, Corner, Edge, InstanceLimits, Library, NetId, Netlist, Timing,
+    CellId, CellKind, CheckKind, Corner, Edge, InstanceLimits, Library, NetId, Netlist, Timing,
 };
 use crate::units::Time;
 
@@ -90,6 +90,37 @@ pub(super) struct MeasuredSlack {
 }
 
 /// Judges every flip-flop of a netlist.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::kernel::{Drive, Kernel, Stimulus, TimingChecks};
+/// use femtogate::netlist::{
+///     CellKind, CheckKind, Corner, Library, ModuleBuilder, Netlist, Timing,
+/// };
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (d, ck, r, q) = (m.input("D"), m.input("CK"), m.input("R"), m.output("Q"));
+/// m.cell("bit", CellKind::Dffr, &[d, ck, r], &[Some(q), None]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let library = Library::generic_40nm();
+/// let timing = Timing::nominal(&netlist, &library, Corner::Typ);
+///
+/// // D rises a picosecond before CK.
+/// let [d, ck, r] = ["D", "CK", "R"].map(|name| netlist.net(name).unwrap());
+/// let low = [d, ck, r].map(|net| Drive::new(Time::ZERO, net, false));
+/// let rises = [(9_999, d), (10_000, ck)];
+/// let rises = rises.map(|(ps, net)| Drive::new(Time::from_ps(ps), net, true));
+/// let mut stimulus = Stimulus::new(low).with(rises);
+/// let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ);
+/// Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(20), &mut checks)?;
+///
+/// let report = checks.report(&netlist);
+/// assert_eq!(report.summary(CheckKind::Setup).violated, 1);
+/// assert_eq!(report.violations[0].cell, "top.bit");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct TimingChecks {
     pub(super) policy: Policy,
     pub(super) corner: Corner,
@@ -172,8 +203,8 @@ impl TimingChecks {
         let mut index_of: HashMap<InstanceLimits, u32> = HashMap::new();
         self.limits.clear();
         for flip_flop in &mut self.flip_flops {
-            let cell = flip_flop.cell as usize;
-            let limits = *timing.limits(cell, netlist.cells()[cell].kind);
+            let cell = CellId::new(flip_flop.cell as usize);
+            let limits = *timing.limits(cell, netlist.cells()[cell.index()].kind);
             flip_flop.limits = *index_of.entry(limits).or_insert_with(|| {
                 self.limits.push(limits);
                 self.limits.len() as u32 - 1
@@ -203,7 +234,8 @@ impl TimingChecks {
     #[must_use]
     pub fn asynchronous(mut self, netlist: &Netlist, is: impl Fn(&str) -> bool) -> Self {
         for flip_flop in &mut self.flip_flops {
-            flip_flop.is_asynchronous = is(&netlist.cell_path(flip_flop.cell as usize));
+            flip_flop.is_asynchronous =
+                is(&netlist.cell_path(CellId::new(flip_flop.cell as usize)));
         }
         self.grouped()
     }
@@ -226,7 +258,7 @@ impl TimingChecks {
             .sort_by_key(|f| (f.time_fs, f.flip_flop, f.kind, f.pin));
         let path = |found: &MeasuredSlack| {
             let cell = self.flip_flops[found.flip_flop as usize].cell;
-            netlist.cell_path(cell as usize)
+            netlist.cell_path(CellId::new(cell as usize))
         };
         let summaries = CheckKind::ALL.map(|kind| {
             let tally = &self.summaries[kind as usize];
@@ -239,8 +271,8 @@ impl TimingChecks {
                 worst: tally.worst.as_ref().map(|found| SlackLocation {
                     cell: path(found),
                     pin: PINS[found.pin as usize].to_owned(),
-                    time_fs: found.time_fs,
-                    slack_fs: found.slack_fs,
+                    time: Time::from_fs(found.time_fs),
+                    slack: Time::from_fs(found.slack_fs),
                 }),
                 histogram: tally.histogram.to_vec(),
             }
@@ -250,15 +282,15 @@ impl TimingChecks {
             cell: path(found),
             pin: PINS[found.pin as usize].to_owned(),
             edge: found.edge,
-            time_fs: found.time_fs,
-            slack_fs: found.slack_fs,
+            time: Time::from_fs(found.time_fs),
+            slack: Time::from_fs(found.slack_fs),
             is_asynchronous: found.is_asynchronous,
         });
         let asynchronous = self.flip_flops.iter().filter(|f| f.is_asynchronous);
         CheckReport {
             policy: self.policy,
             corner: self.corner,
-            not_before_fs: (self.not_before_fs != NEVER).then_some(self.not_before_fs),
+            not_before: (self.not_before_fs != NEVER).then_some(Time::from_fs(self.not_before_fs)),
             flip_flops: self.flip_flops.len(),
             asynchronous_flip_flops: asynchronous.count(),
             memory_bytes: self.memory_bytes(),
@@ -304,11 +336,12 @@ impl Observer for TimingChecks {
     }
 
     #[inline]
-    fn doubtful(&mut self) -> Option<usize> {
+    fn doubtful(&mut self) -> Option<CellId> {
         if self.policy == Policy::ReportOnly {
             return None;
         }
         self.complete();
-        self.doubtful.pop().map(|cell| cell as usize)
+        let cell = self.doubtful.pop()?;
+        Some(CellId::new(cell as usize))
     }
 }

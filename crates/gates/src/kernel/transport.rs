@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 
-use crate::netlist::{DelayModel, Netlist, Timing};
+use crate::netlist::{CellId, DelayModel, Netlist, Timing};
 
 /// No queue.
 const NONE: u32 = u32::MAX;
@@ -99,7 +99,7 @@ impl TransportQueues {
 pub(super) fn transport_nets(netlist: &Netlist, timing: &Timing) -> impl Iterator<Item = usize> {
     let cells = netlist.cells().iter().enumerate();
     cells
-        .filter(|(index, _)| timing.model(*index) == DelayModel::Transport)
+        .filter(|(index, _)| timing.model(CellId::new(*index)) == DelayModel::Transport)
         .flat_map(|(_, cell)| cell.output_nets())
         .map(|net| net.index())
 }
@@ -120,7 +120,7 @@ mod tests {
         m.gate(CellKind::Buf, &[a]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
-        timing.set_model(0, DelayModel::Transport);
+        timing.set_model(CellId::new(0), DelayModel::Transport);
         let queues = TransportQueues::new(&netlist, &timing);
         let net = queues.nets().next().unwrap();
         (queues, net)

@@ -16,8 +16,8 @@ use super::composite::{ByEdge, Composite, Conditions, MOST_STAGES};
 use super::mapping::CellMap;
 use super::read::Liberty;
 use crate::netlist::{
-    CellKind, CheckLimits, Corner, FlatCell, Library, MAX_INPUTS, MAX_OUTPUTS, Module, NetId,
-    Netlist, Timing, TimingArc,
+    CellId, CellKind, CheckLimits, Corner, FlatCell, Library, MAX_INPUTS, MAX_OUTPUTS, Module,
+    NetId, Netlist, ScopeId, Timing, TimingArc,
 };
 
 /// What a netlist finds around it.
@@ -153,11 +153,14 @@ impl CharacterisedNetlist {
                 let characterised = Self::new(&alone, library, environment);
                 Arc::new((alone, characterised))
             });
-            let first = netlist.cells_of(scope).start;
-            blocks.push(Block {
-                cells: first..first + at.module.total_cells(),
-                alone: Arc::clone(alone),
-            });
+            let mut cells = netlist.cells_below(ScopeId::new(scope));
+            let count = cells.len();
+            if let Some(first) = cells.next() {
+                blocks.push(Block {
+                    cells: first.index()..first.index() + count,
+                    alone: Arc::clone(alone),
+                });
+            }
             scope += at.subtree;
         }
         let mut work = Characterisation::new(netlist, &library.map, environment, blocks);
@@ -170,11 +173,9 @@ impl CharacterisedNetlist {
     }
 
     /// Area (in the library's unit) and leakage (W) of the cells below a scope of `netlist`.
-    pub fn silicon(&self, netlist: &Netlist, library: &Liberty, scope: usize) -> (f64, f64) {
-        let first = netlist.cells_of(scope).start;
-        let cells = first..first + netlist.scopes()[scope].module.total_cells();
+    pub fn silicon(&self, netlist: &Netlist, library: &Liberty, scope: ScopeId) -> (f64, f64) {
         let (mut area, mut leakage_w) = (0.0, 0.0);
-        for cell in cells {
+        for cell in netlist.cells_below(scope) {
             let (composite, _) = self.instance(netlist, &library.map, cell);
             for stage in composite.used() {
                 area += composite.cell(stage).area;
@@ -188,17 +189,15 @@ impl CharacterisedNetlist {
     /// each net changes as often as `changes` says.
     pub fn energy_j(
         &self,
-        (netlist, scope): (&Netlist, usize),
+        (netlist, scope): (&Netlist, ScopeId),
         library: &Liberty,
         volt: f64,
         changes: impl Fn(NetId) -> f64,
     ) -> [f64; 2] {
-        let first = netlist.cells_of(scope).start;
-        let cells = first..first + netlist.scopes()[scope].module.total_cells();
         let toggles = |net: Option<NetId>| net.map_or(0.0, &changes);
-        let each = cells.map(|cell| {
+        let each = netlist.cells_below(scope).map(|cell| {
             let (composite, conditions) = self.instance(netlist, &library.map, cell);
-            let leaf = &netlist.cells()[cell];
+            let leaf = &netlist.cells()[cell.index()];
             composite.energy_fj(
                 &conditions,
                 leaf.inputs.map(toggles),
@@ -213,7 +212,7 @@ impl CharacterisedNetlist {
     pub fn largest_limits(&self, netlist: &Netlist, kind: CellKind) -> Option<CheckLimits> {
         let cells = netlist.cells().iter().enumerate();
         let limits = cells.filter(|(_, cell)| cell.kind == kind);
-        let limits = limits.map(|(index, _)| *self.timing.limits(index, kind));
+        let limits = limits.map(|(index, _)| *self.timing.limits(CellId::new(index), kind));
         let largest = limits.reduce(|a, b| a.larger(&b));
         largest.map(|limits| limits.of_kind())
     }
@@ -221,37 +220,39 @@ impl CharacterisedNetlist {
     /// The shortest and the longest delay of any instance in `netlist`, fs as its tables give them, each with the library's cells that it is of
     /// and where they stand. Delays of [`CharacterisedNetlist::timing`] are whole, from 0 to 4.295 us.
     pub fn extreme_delays(&self, netlist: &Netlist, library: &Liberty) -> [(f64, String); 2] {
-        let mut extremes = [(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)];
-        for (index, cell) in netlist.cells().iter().enumerate() {
-            let (composite, conditions) = self.instance(netlist, &library.map, index);
+        let mut extremes = [f64::INFINITY, f64::NEG_INFINITY].map(|fs| (fs, CellId::new(0)));
+        for (id, cell) in netlist.cells_below(ScopeId::TOP).zip(netlist.cells()) {
+            let (composite, conditions) = self.instance(netlist, &library.map, id);
             let [shortest, longest] = composite.extreme_delays(cell.kind, &conditions);
             if shortest < extremes[0].0 {
-                extremes[0] = (shortest, index);
+                extremes[0] = (shortest, id);
             }
             if longest > extremes[1].0 {
-                extremes[1] = (longest, index);
+                extremes[1] = (longest, id);
             }
         }
-        extremes.map(|(fs, index)| {
-            let (composite, _) = self.instance(netlist, &library.map, index);
+        extremes.map(|(fs, cell)| {
+            let (composite, _) = self.instance(netlist, &library.map, cell);
             let cells = composite.used().map(|stage| composite.cell(stage));
             let cells = cells.map(|cell| format!("{} ({})", cell.name, cell.place));
             (fs, cells.collect::<Vec<_>>().join(" + "))
         })
     }
 
-    /// The instance at an index, and what the nets at it do to it.
+    /// What stands for a cell, and what the nets at it do to it.
     pub(super) fn instance<'m>(
         &'m self,
         netlist: &Netlist,
         map: &'m CellMap,
-        cell: usize,
+        cell: CellId,
     ) -> (Composite<'m>, Conditions) {
+        let cell = cell.index();
         let after = self.blocks.partition_point(|block| block.cells.end <= cell);
         match self.blocks.get(after) {
             Some(block) if block.cells.contains(&cell) => {
                 let (alone, characterised) = &*block.alone;
-                characterised.instance(alone, map, cell - block.cells.start)
+                let own = CellId::new(cell - block.cells.start);
+                characterised.instance(alone, map, own)
             }
             _ => {
                 let conditions = self.nets.conditions(&netlist.cells()[cell]);
@@ -444,15 +445,15 @@ impl<'w> Characterisation<'w> {
         for block in &self.blocks {
             let alone = &block.alone.1;
             let at = adopted.entry(Arc::as_ptr(&block.alone)).or_insert(None);
-            *at = Some(timing.adopt(block.cells.start, &alone.timing, *at));
+            *at = Some(timing.adopt(CellId::new(block.cells.start), &alone.timing, *at));
         }
         for &index in &self.outside {
             let cell = &self.netlist.cells()[index];
             let (composite, conditions) = (self.composite(index), self.nets.conditions(cell));
             let (delays, limits) = composite.characterise(cell.kind, &conditions);
-            timing.set(index, delays);
+            timing.set(CellId::new(index), delays);
             if cell.kind.is_flip_flop() {
-                timing.set_limits(index, limits);
+                timing.set_limits(CellId::new(index), limits);
             }
         }
         CharacterisedNetlist {

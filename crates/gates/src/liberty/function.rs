@@ -38,6 +38,7 @@ impl TruthTable {
     }
 
     /// The value of a function that has only one.
+    #[cfg(feature = "yosys")]
     pub(crate) fn constant(self) -> Option<bool> {
         [false, true]
             .into_iter()

@@ -16,7 +16,7 @@ use super::characterised::CharacterisedNetlist;
 use super::function::TruthTable;
 use super::read::Liberty;
 use super::verilog_name::in_verilog;
-use crate::netlist::Netlist;
+use crate::netlist::{Netlist, ScopeId};
 use crate::verilog::{DFFSR_STATE, HEAD};
 
 /// Writes a module for every library cell and drive in the netlist of [`write_mapped`](super::write_mapped).
@@ -30,8 +30,8 @@ pub fn write_mapped_cells(
     characterised: &CharacterisedNetlist,
 ) -> io::Result<()> {
     let mut models = BTreeMap::new();
-    for index in 0..netlist.cells().len() {
-        let (composite, _) = characterised.instance(netlist, &library.map, index);
+    for cell in netlist.cells_below(ScopeId::TOP) {
+        let (composite, _) = characterised.instance(netlist, &library.map, cell);
         for stage in composite.used() {
             let model = composite.cell(stage);
             models.insert(model.name.as_str(), model);

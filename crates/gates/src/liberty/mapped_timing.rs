@@ -8,7 +8,7 @@ use super::mapped_wires::write_wires;
 use super::mapping::Source;
 use super::read::Liberty;
 use super::verilog_name::in_sdf;
-use crate::netlist::{Edge, NetId, Netlist, caused};
+use crate::netlist::{CellId, Edge, NetId, Netlist, ScopeId, caused};
 use crate::units::Time;
 
 /// Writes the delays of every library cell's arcs as SDF, for the netlist of [`write_mapped`](super::write_mapped): ps, one value.
@@ -26,9 +26,9 @@ pub fn write_mapped_sdf(
         out,
         "(DELAYFILE\n(SDFVERSION \"3.0\")\n(DESIGN \"{top}\")\n(DIVIDER /)\n(TIMESCALE 1ps)"
     )?;
-    for index in 0..netlist.cells().len() {
-        let (composite, conditions) = characterised.instance(netlist, &library.map, index);
-        let path = netlist.cell_path(index);
+    for cell in netlist.cells_below(ScopeId::TOP) {
+        let (composite, conditions) = characterised.instance(netlist, &library.map, cell);
+        let path = netlist.cell_path(cell);
         for stage in composite.used() {
             let model = composite.cell(stage);
             let instance = in_sdf(&composite.instance_name(&path, stage));
@@ -66,7 +66,7 @@ pub struct Clocking<'c> {
     /// Its period.
     pub period: Time,
     /// Flip-flops that may clock each other, such as a ripple counter's, from the first on.
-    pub ripple: &'c [usize],
+    pub ripple: &'c [CellId],
     /// Input ports whose rise follows the clock's fall, and by how much.
     pub after_fall: &'c [(&'c str, Time)],
 }
@@ -117,7 +117,7 @@ pub fn write_constraints(
         .port_signals()
         .flat_map(|(_, signal)| netlist.signal_nets(top, signal));
     let ports: BTreeSet<NetId> = ports.collect();
-    let others = netlist.cells().iter().enumerate();
+    let others = netlist.cells_below(ScopeId::TOP).zip(netlist.cells());
     let others =
         others.filter(|(cell, leaf)| leaf.kind.is_flip_flop() && !clocking.ripple.contains(cell));
     let outside: BTreeSet<NetId> = others.map(|(_, leaf)| leaf.input(1)).collect();
@@ -127,8 +127,10 @@ pub fn write_constraints(
     for (index, &cell) in clocking.ripple.iter().enumerate() {
         // What comes back to an earlier one, as LOCAL_STOP does to block COUNTER_CLK, gates a clock and is none.
         let later = clocking.ripple[index + 1..].iter();
-        let later: BTreeSet<NetId> = later.map(|&cell| netlist.cells()[cell].input(1)).collect();
-        let leaf = &netlist.cells()[cell];
+        let later: BTreeSet<NetId> = later
+            .map(|&cell| netlist.cells()[cell.index()].input(1))
+            .collect();
+        let leaf = &netlist.cells()[cell.index()];
         let (composite, _) = characterised.instance(netlist, &library.map, cell);
         let path = netlist.cell_path(cell);
         let Some((stage, pin)) = composite.pin_behind(Source::Input(1)) else {

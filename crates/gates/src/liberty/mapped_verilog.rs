@@ -9,7 +9,7 @@ use super::characterised::CharacterisedNetlist;
 use super::mapping::Source;
 use super::read::Liberty;
 use super::verilog_name::in_verilog;
-use crate::netlist::{Direction, NetId, Netlist};
+use crate::netlist::{Direction, NetId, Netlist, ScopeId};
 
 const HEAD: &str = "\
 // Outputs that nothing reads stay open.
@@ -56,9 +56,9 @@ pub fn write_mapped(
     for (name, _) in names.iter().zip(&is_port).filter(|(_, is_port)| !**is_port) {
         writeln!(out, "  wire {name};")?;
     }
-    for (index, cell) in netlist.cells().iter().enumerate() {
-        let (composite, _) = characterised.instance(netlist, &library.map, index);
-        let path = netlist.cell_path(index);
+    for (id, cell) in netlist.cells_below(ScopeId::TOP).zip(netlist.cells()) {
+        let (composite, _) = characterised.instance(netlist, &library.map, id);
+        let path = netlist.cell_path(id);
         let inner = |stage: usize, output: usize| format!("\\{path}.{stage}.{output} ");
         let driven = |stage: usize, output: usize| {
             let mut outputs = composite.recipe.outputs.iter().zip(&cell.outputs);

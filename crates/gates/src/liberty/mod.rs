@@ -57,9 +57,11 @@ mod text;
 mod units;
 mod verilog_name;
 
+#[cfg(feature = "yosys")]
 pub(crate) use cell::{CellFunction, Role};
 pub use characterised::{CharacterisedNetlist, Environment};
 pub use error::{KitError, LibertyError};
+#[cfg(feature = "yosys")]
 pub(crate) use function::TruthTable;
 pub use mapped_models::write_mapped_cells;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};

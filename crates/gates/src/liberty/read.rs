@@ -34,6 +34,7 @@ pub struct Liberty {
 
 impl Liberty {
     /// What a cell does, if it is a gate of up to six inputs or a flip-flop.
+    #[cfg(feature = "yosys")]
     pub(crate) fn function(&self, cell: &str) -> Option<&CellFunction> {
         self.functions.get(cell)
     }
@@ -42,6 +43,26 @@ impl Liberty {
     ///
     /// # Errors
     /// What is no Liberty, units that are not known, and a library from which the cells here cannot be made.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::liberty::Liberty;
+    /// use femtogate::netlist::CellKind;
+    ///
+    /// let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/three_cells.lib");
+    /// let text = std::fs::read_to_string(file)?;
+    /// let library = Liberty::read(&text, &[])?;
+    /// assert_eq!(library.name, "three_cells");
+    /// assert_eq!(library.map.cells(CellKind::And2), ["NAND", "INV"]);
+    ///
+    /// let fault = Liberty::read(&text.replace("1ns", "1h"), &[]).unwrap_err();
+    /// assert_eq!(
+    ///     fault.to_string(),
+    ///     "its time_unit is \"1h\"; give a number, a prefix and s, as in 1ns"
+    /// );
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn read(text: &str, wanted: &[(CellKind, String)]) -> Result<Self, LibertyError> {
         Self::read_files(&[("", text)], wanted).map_err(|e| e.fault)
     }

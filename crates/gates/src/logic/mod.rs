@@ -8,6 +8,17 @@ use std::fmt;
 use std::ops::Not;
 
 /// One wire's value.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::logic::Logic;
+///
+/// assert_eq!(!Logic::One, Logic::Zero);
+/// assert_eq!(!Logic::Z, Logic::X);
+/// assert_eq!((Logic::One.to_bool(), Logic::X.to_bool()), (Some(true), None));
+/// assert_eq!(Logic::from(true), Logic::One);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[repr(u8)]
 pub enum Logic {

@@ -226,6 +226,20 @@ impl ModuleBuilder {
     ///
     /// # Panics
     /// When `inputs` is empty.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{CellKind, ModuleBuilder};
+    ///
+    /// let mut m = ModuleBuilder::new("parity");
+    /// let word = m.input_bus("WORD", 8);
+    /// let odd = m.tree(CellKind::Xor2, &word);
+    /// let parity = m.output("PARITY");
+    /// m.gate_into(CellKind::Buf, &[odd], parity);
+    /// assert_eq!(m.finish()?.cells().len(), 7 + 1);
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn tree(&mut self, kind: CellKind, inputs: &[Net]) -> Net {
         assert!(!inputs.is_empty(), "a tree needs a leaf");
         let mut level = inputs.to_vec();
@@ -258,16 +272,15 @@ impl ModuleBuilder {
         ports: &[(&str, Vec<Option<Net>>)],
     ) {
         let mut connections = Vec::new();
-        let problem = |port: &str, problem| NetlistError::PortMismatch {
-            module: String::new(),
-            instance: name.to_owned(),
-            port: port.to_owned(),
-            problem,
-        };
+        let parent = self.module.name.clone();
         let mut errors = Vec::new();
         for (port, _) in ports {
             if !module.port_signals().any(|(_, s)| s.name == *port) {
-                errors.push(problem(port, "has no"));
+                errors.push(NetlistError::NoPort {
+                    module: parent.clone(),
+                    instance: name.to_owned(),
+                    port: (*port).to_owned(),
+                });
             }
         }
         for (direction, signal) in module.port_signals() {
@@ -289,15 +302,14 @@ impl ModuleBuilder {
                 None if direction == Direction::Output => {
                     connections.extend(signal.nets().map(|_| None));
                 }
-                None => errors.push(problem(&signal.name, "leaves open input")),
+                None => errors.push(NetlistError::OpenInput {
+                    module: parent.clone(),
+                    instance: name.to_owned(),
+                    port: signal.name.clone(),
+                }),
             }
         }
-        for mut error in errors {
-            if let NetlistError::PortMismatch { module, .. } = &mut error {
-                module.clone_from(&self.module.name);
-            }
-            self.fail(error);
-        }
+        errors.into_iter().for_each(|error| self.fail(error));
         self.module.instances.push(Instance {
             name: name.to_owned(),
             module: Arc::clone(module),
@@ -332,6 +344,20 @@ impl ModuleBuilder {
     /// # Errors
     /// The first mistake made: driver conflicts, undriven nets, wrong widths, unknown ports,
     /// duplicate or unusable names.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::ModuleBuilder;
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// m.output("Z");
+    /// let error = m.finish().unwrap_err();
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "module top: nothing drives net Z; connect an output to it or remove it"
+    /// );
+    /// ```
     pub fn finish(mut self) -> Result<Arc<Module>, NetlistError> {
         if let Some(net) = self.drivers.iter().position(Option::is_none) {
             let error = NetlistError::Undriven {
@@ -449,7 +475,7 @@ mod tests {
         let leaf = m.finish().unwrap();
         let mut m = ModuleBuilder::new("top");
         m.instance("u", &leaf, &[]);
-        assert!(matches!(m.finish(), Err(NetlistError::PortMismatch { .. })));
+        assert!(matches!(m.finish(), Err(NetlistError::OpenInput { .. })));
     }
 
     #[test]
@@ -467,6 +493,6 @@ mod tests {
         let mut m = ModuleBuilder::new("top");
         m.input("A");
         m.instance_by_names("u", &leaf, &[]);
-        assert!(matches!(m.finish(), Err(NetlistError::PortMismatch { .. })));
+        assert!(matches!(m.finish(), Err(NetlistError::OpenInput { .. })));
     }
 }

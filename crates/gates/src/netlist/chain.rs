@@ -14,6 +14,7 @@ use std::collections::BTreeSet;
 use super::cell::CellKind;
 use super::delay::DelayModel;
 use super::flat::Netlist;
+use super::id::CellId;
 use super::own_delay::OwnDelay;
 
 /// Longest stage in the typical corner, fs: shorter than the shortest pulse that gates of this library leave, 57.6 ps.
@@ -45,17 +46,19 @@ impl Chain {
     }
 
     /// The chain that a cell of a netlist is.
-    pub(crate) fn of_cell(netlist: &Netlist, cell: usize) -> Option<Self> {
+    pub(crate) fn of_cell(netlist: &Netlist, cell: CellId) -> Option<Self> {
         let own = netlist.own_delays();
         let at = own.binary_search_by_key(&cell, |own| own.0).ok()?;
-        Chain::from_delay(netlist.cells()[cell].kind, Some(own[at].1))
+        Chain::from_delay(netlist.cells()[cell.index()].kind, Some(own[at].1))
     }
 
     /// The kinds of chain in a netlist.
     pub fn all(netlist: &Netlist) -> BTreeSet<Self> {
         let own = netlist.own_delays().iter();
-        own.filter_map(|&(cell, own)| Chain::from_delay(netlist.cells()[cell].kind, Some(own)))
-            .collect()
+        own.filter_map(|&(cell, own)| {
+            Chain::from_delay(netlist.cells()[cell.index()].kind, Some(own))
+        })
+        .collect()
     }
 
     /// Name of its module in Verilog.
@@ -74,7 +77,7 @@ impl Chain {
     }
 
     /// The stage of a chain at a dotted path: its cell, and its number.
-    pub(crate) fn find(netlist: &Netlist, path: &str) -> Option<(usize, Self, usize)> {
+    pub(crate) fn find(netlist: &Netlist, path: &str) -> Option<(CellId, Self, usize)> {
         let (element, stage) = path.rsplit_once('.')?;
         let cell = netlist.cell(element)?;
         let chain = Chain::of_cell(netlist, cell)?;

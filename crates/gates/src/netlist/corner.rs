@@ -4,19 +4,18 @@ use crate::logic::Logic;
 
 /// Which of the three characterised delays applies: of slow, typical or fast silicon. SDF calls the delays max, typ and
 /// min, and configurations may, too.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
-)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Corner {
     /// Fastest silicon, highest voltage: shortest delays.
-    #[serde(alias = "min")]
+    #[cfg_attr(feature = "serde", serde(alias = "min"))]
     Fast,
     /// Typical silicon, 50 °C.
     #[default]
     Typ,
     /// Slowest silicon, lowest voltage: longest delays.
-    #[serde(alias = "max")]
+    #[cfg_attr(feature = "serde", serde(alias = "max"))]
     Slow,
 }
 
@@ -99,10 +98,9 @@ impl Delay {
 }
 
 /// Direction of a change.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
-)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Edge {
     /// To 1.
     Rise,

@@ -38,17 +38,25 @@ pub enum NetlistError {
         /// Nets it got.
         got: usize,
     },
-    /// An instance names a port its module does not have, or leaves an input open.
-    #[error("module {module}: instance {instance} {problem} port {port}")]
-    PortMismatch {
+    /// An instance names a port that its module does not have.
+    #[error("module {module}: instance {instance} has no port {port}")]
+    NoPort {
         /// Module at fault.
         module: String,
         /// Instance at fault.
         instance: String,
-        /// Port at fault.
+        /// Name of the port.
         port: String,
-        /// What is wrong with it.
-        problem: &'static str,
+    },
+    /// An instance leaves an input open.
+    #[error("module {module}: instance {instance} leaves open input port {port}")]
+    OpenInput {
+        /// Module at fault.
+        module: String,
+        /// Instance at fault.
+        instance: String,
+        /// Name of the port.
+        port: String,
     },
     /// Two things of the same name in one module.
     #[error("module {module}: the name {name} is used twice")]

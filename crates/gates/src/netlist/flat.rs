@@ -4,33 +4,12 @@
 //! module's local nets to the chip's nets. Names are stored in the modules alone: a path is followed from module to
 //! module, one hash look-up for each name in it.
 
-use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
+use super::id::{CellId, NetId, ScopeId};
 use super::module::{Direction, Module, Net};
 use super::own_delay::OwnDelay;
-
-/// A net of the elaborated chip.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct NetId(
-    // One more than its index, so that an `Option` of it takes no more memory.
-    NonZeroU32,
-);
-
-impl NetId {
-    /// From an index.
-    #[inline]
-    pub const fn new(index: usize) -> Self {
-        NetId(NonZeroU32::MIN.saturating_add(index as u32))
-    }
-
-    /// Index into per-net arrays.
-    #[inline]
-    pub const fn index(self) -> usize {
-        (self.0.get() - 1) as usize
-    }
-}
 
 /// A leaf cell of the elaborated chip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,8 +50,8 @@ pub struct Scope {
     pub name: String,
     /// What it is an instance of.
     pub module: Arc<Module>,
-    /// Index of the parent scope (the top is its own parent).
-    pub parent: usize,
+    /// The scope around it; the top is its own parent.
+    pub parent: ScopeId,
     /// Number of scopes in this subtree, itself included: the next sibling is that far on.
     pub subtree: usize,
     first_net: usize,
@@ -89,11 +68,33 @@ pub struct Netlist {
     scopes: Vec<Scope>,
     net_map: Vec<NetId>,
     /// Cells with delays of their own, in order.
-    own_delays: Vec<(usize, OwnDelay)>,
+    own_delays: Vec<(CellId, OwnDelay)>,
 }
 
 impl Netlist {
     /// Flattens `top` and everything below it. The top scope is named after its module.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+    ///
+    /// let mut m = ModuleBuilder::new("inverter");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("gate", CellKind::Inv, &[a], &[z]);
+    /// let inverter = m.finish()?;
+    ///
+    /// let mut m = ModuleBuilder::new("pair");
+    /// let (a, between, z) = (m.input("A"), m.wire("BETWEEN"), m.output("Z"));
+    /// m.instance("first", &inverter, &[("A", &[a]), ("Z", &[between])]);
+    /// m.instance("second", &inverter, &[("A", &[between]), ("Z", &[z])]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    ///
+    /// assert_eq!((netlist.cells().len(), netlist.net_count()), (2, 3));
+    /// let gate = netlist.cell("second.gate").unwrap();
+    /// assert_eq!(netlist.cell_path(gate), "pair.second.gate");
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn elaborate(top: &Arc<Module>) -> Self {
         let mut netlist = Netlist {
             cells: Vec::with_capacity(top.total_cells()),
@@ -107,7 +108,7 @@ impl Netlist {
             .flat_map(|(_, s)| s.nets())
             .map(|_| Some(netlist.new_net()))
             .collect();
-        netlist.stamp(top, top.name(), 0, &ports);
+        netlist.stamp(top, top.name(), ScopeId::TOP, &ports);
         netlist
     }
 
@@ -120,7 +121,13 @@ impl Netlist {
         NetId::new(self.net_count - 1)
     }
 
-    fn stamp(&mut self, module: &Arc<Module>, name: &str, parent: usize, ports: &[Option<NetId>]) {
+    fn stamp(
+        &mut self,
+        module: &Arc<Module>,
+        name: &str,
+        parent: ScopeId,
+        ports: &[Option<NetId>],
+    ) {
         let index = self.scopes.len();
         let first_net = self.net_map.len();
         let mut nets = vec![None; module.net_count()];
@@ -142,8 +149,10 @@ impl Netlist {
                 inputs: cell.inputs.map(|n| global(&self.net_map, n)),
                 outputs: cell.outputs.map(|n| global(&self.net_map, n)),
             };
-            self.own_delays
-                .extend(cell.own_delay.map(|delay| (self.cells.len(), delay)));
+            self.own_delays.extend(
+                cell.own_delay
+                    .map(|delay| (CellId::new(self.cells.len()), delay)),
+            );
             self.cells.push(flat);
         }
         self.scopes.push(Scope {
@@ -159,7 +168,12 @@ impl Netlist {
         for child in module.instances() {
             child_ports.clear();
             child_ports.extend(child.connections.iter().map(|&n| global(&self.net_map, n)));
-            self.stamp(&child.module, &child.name, index, &child_ports);
+            self.stamp(
+                &child.module,
+                &child.name,
+                ScopeId::new(index),
+                &child_ports,
+            );
         }
         self.scopes[index].subtree = self.scopes.len() - index;
     }
@@ -170,20 +184,28 @@ impl Netlist {
     }
 
     /// Cells whose delays are their own instead of the library's, in ascending order.
-    pub fn own_delays(&self) -> &[(usize, OwnDelay)] {
+    pub fn own_delays(&self) -> &[(CellId, OwnDelay)] {
         &self.own_delays
     }
 
-    /// Indices of the leaf cells directly in scope `index`, in the order of its module.
-    pub fn cells_of(&self, index: usize) -> std::ops::Range<usize> {
-        let scope = &self.scopes[index];
-        scope.first_cell..scope.first_cell + scope.module.cells().len()
+    /// The leaf cells directly in a scope, in the order of its module.
+    pub fn cells_of(
+        &self,
+        scope: ScopeId,
+    ) -> impl ExactSizeIterator<Item = CellId> + DoubleEndedIterator + Clone + use<> {
+        let scope = &self.scopes[scope.index()];
+        let cells = scope.first_cell..scope.first_cell + scope.module.cells().len();
+        cells.map(CellId::new)
     }
 
-    /// Indices of the leaf cells in scope `index` and in all scopes below it.
-    pub fn cells_below(&self, index: usize) -> std::ops::Range<usize> {
-        let scope = &self.scopes[index];
-        scope.first_cell..scope.first_cell + scope.module.total_cells()
+    /// The leaf cells in a scope and in all scopes below it, in ascending order without gaps.
+    pub fn cells_below(
+        &self,
+        scope: ScopeId,
+    ) -> impl ExactSizeIterator<Item = CellId> + DoubleEndedIterator + Clone + use<> {
+        let scope = &self.scopes[scope.index()];
+        let cells = scope.first_cell..scope.first_cell + scope.module.total_cells();
+        cells.map(CellId::new)
     }
 
     /// Number of nets.
@@ -206,44 +228,63 @@ impl Netlist {
         signal.nets().map(move |n| self.net_map[first + n.index()])
     }
 
-    /// Indices of the scopes directly below scope `index`.
-    pub fn children(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
-        let end = index + self.scopes[index].subtree;
-        let mut next = index + 1;
+    /// The scopes directly below a scope.
+    pub fn children(&self, scope: ScopeId) -> impl Iterator<Item = ScopeId> + '_ {
+        let end = scope.index() + self.scopes[scope.index()].subtree;
+        let mut next = scope.index() + 1;
         std::iter::from_fn(move || {
             let this = next;
             (this < end).then(|| {
                 next += self.scopes[this].subtree;
-                this
+                ScopeId::new(this)
             })
         })
     }
 
     /// The scope at a dotted path below the top; the empty path is the top itself.
-    pub fn scope(&self, path: &str) -> Option<usize> {
+    pub fn scope(&self, path: &str) -> Option<ScopeId> {
         path.split('.')
             .filter(|part| !part.is_empty())
             .try_fold(0, |scope, part| {
                 Some(scope + self.scopes[scope].module.scope_offset(part)?)
             })
+            .map(ScopeId::new)
     }
 
     /// The leaf cell at a dotted path below the top.
-    pub fn cell(&self, path: &str) -> Option<usize> {
+    pub fn cell(&self, path: &str) -> Option<CellId> {
         let (scope_path, name) = path.rsplit_once('.').unwrap_or(("", path));
-        let scope = &self.scopes[self.scope(scope_path)?];
-        Some(scope.first_cell + scope.module.cell(name)?)
+        let scope = &self.scopes[self.scope(scope_path)?.index()];
+        Some(CellId::new(scope.first_cell + scope.module.cell(name)?))
     }
 
     /// Nets of the signal at a dotted path below the top, such as `mp_r0_c0.p_counter.COUNT`.
     pub fn signal(&self, path: &str) -> Option<Vec<NetId>> {
         let (scope_path, name) = path.rsplit_once('.').unwrap_or(("", path));
-        let scope = &self.scopes[self.scope(scope_path)?];
+        let scope = &self.scopes[self.scope(scope_path)?.index()];
         let signal = scope.module.signal(name)?;
         Some(self.signal_nets(scope, signal).collect())
     }
 
     /// The net at a dotted path below the top; one bit of a bus as `path.BUS[3]`.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output_bus("Z", 2));
+    /// m.gate_into(CellKind::Buf, &[a], z[0]);
+    /// m.gate_into(CellKind::Inv, &[a], z[1]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    ///
+    /// let bit = netlist.net("Z[1]").unwrap();
+    /// assert_eq!(netlist.net_path(bit).unwrap(), "top.Z[1]");
+    /// assert_eq!(netlist.net("Z"), None); // A bus has several nets.
+    /// assert_eq!(netlist.signal("Z").unwrap()[1], bit);
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn net(&self, path: &str) -> Option<NetId> {
         if let Some((bus, index)) = path.strip_suffix(']').and_then(|p| p.rsplit_once('[')) {
             return self.signal(bus)?.get(index.parse::<usize>().ok()?).copied();
@@ -265,23 +306,24 @@ impl Netlist {
     }
 
     /// Dotted path of a scope, top name first.
-    pub fn scope_path(&self, mut index: usize) -> String {
-        let mut parts = vec![self.scopes[index].name.as_str()];
-        while index != 0 {
-            index = self.scopes[index].parent;
-            parts.push(&self.scopes[index].name);
+    pub fn scope_path(&self, mut scope: ScopeId) -> String {
+        let mut parts = vec![self.scopes[scope.index()].name.as_str()];
+        while scope != ScopeId::TOP {
+            scope = self.scopes[scope.index()].parent;
+            parts.push(&self.scopes[scope.index()].name);
         }
         parts.reverse();
         parts.join(".")
     }
 
     /// Dotted path of a leaf cell, top name first.
-    pub fn cell_path(&self, cell: usize) -> String {
+    pub fn cell_path(&self, cell: CellId) -> String {
         // Scopes are in stamping order, so their first cells ascend.
-        let scope = self.scopes.partition_point(|s| s.first_cell <= cell) - 1;
-        let s = &self.scopes[scope];
-        let name = &s.module.cells()[cell - s.first_cell].name;
-        format!("{}.{name}", self.scope_path(scope))
+        let after = |scope: &Scope| scope.first_cell <= cell.index();
+        let index = self.scopes.partition_point(after) - 1;
+        let scope = &self.scopes[index];
+        let name = &scope.module.cells()[cell.index() - scope.first_cell].name;
+        format!("{}.{name}", self.scope_path(ScopeId::new(index)))
     }
 
     /// Dotted path of a net in the outermost scope that names it.
@@ -294,7 +336,7 @@ impl Netlist {
         let mut signals = scope.module.signals().iter();
         let signal = signals.find(|s| s.nets().any(|n| n.index() == position))?;
         let bit = position - signal.nets().next()?.index();
-        let path = format!("{}.{}", self.scope_path(index), signal.name);
+        let path = format!("{}.{}", self.scope_path(ScopeId::new(index)), signal.name);
         Some(if signal.is_bus {
             format!("{path}[{bit}]")
         } else {
@@ -334,11 +376,11 @@ mod tests {
     #[test]
     fn names_are_recovered() {
         let n = Netlist::elaborate(&two_inverters());
-        assert_eq!(n.cell_path(1), "pair.second.inv");
-        assert_eq!(n.cell("second.inv"), Some(1));
+        assert_eq!(n.cell_path(CellId::new(1)), "pair.second.inv");
+        assert_eq!(n.cell("second.inv"), Some(CellId::new(1)));
         assert_eq!((n.cell("inv"), n.cell("second.INV")), (None, None));
         assert_eq!(n.net_path(n.net("second.Z").unwrap()).unwrap(), "pair.Z[1]");
-        assert_eq!(n.children(0).count(), 2);
+        assert_eq!(n.children(ScopeId::TOP).count(), 2);
     }
 
     #[test]
@@ -351,9 +393,9 @@ mod tests {
         m.instance("z", &pair, &[("A", &[a])]);
         let n = Netlist::elaborate(&m.finish().unwrap());
         let below_top = |path: String| path.split_once('.').map(|(_, p)| p.to_owned());
-        for index in 1..n.scopes().len() {
-            let path = below_top(n.scope_path(index)).unwrap();
-            assert_eq!(n.scope(&path), Some(index), "{path}");
+        for scope in (1..n.scopes().len()).map(ScopeId::new) {
+            let path = below_top(n.scope_path(scope)).unwrap();
+            assert_eq!(n.scope(&path), Some(scope), "{path}");
         }
         for net in (0..n.net_count()).map(NetId::new) {
             let path = below_top(n.net_path(net).unwrap()).unwrap();

@@ -1,7 +1,11 @@
 //! The limits of one flip-flop in one corner: those of the library, or its own from a delay file.
 
-use super::check_limits::{CheckKind, CheckLimits, DataLimit};
-use super::corner::{Corner, Delay, Edge};
+#[cfg(feature = "liberty")]
+use super::check_limits::DataLimit;
+use super::check_limits::{CheckKind, CheckLimits};
+#[cfg(feature = "liberty")]
+use super::corner::Delay;
+use super::corner::{Corner, Edge};
 
 /// Which of a flip-flop's controls a check is about. D and CK have no such choice and are under `Reset`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,11 +22,13 @@ pub struct InstanceLimits([[[u32; 2]; CheckKind::ALL.len()]; 2]);
 
 impl InstanceLimits {
     /// Limits that everything keeps.
+    #[cfg(feature = "liberty")]
     pub(crate) const fn none() -> Self {
         InstanceLimits([[[0; 2]; CheckKind::ALL.len()]; 2])
     }
 
     /// The larger of each limit.
+    #[cfg(feature = "liberty")]
     pub(crate) fn larger(self, other: &Self) -> Self {
         let mut larger = self;
         let (all, others) = (larger.0.as_flattened_mut(), other.0.as_flattened());
@@ -34,6 +40,7 @@ impl InstanceLimits {
     }
 
     /// Limits of one flip-flop as those of its kind, the same in every corner; of set and reset the larger.
+    #[cfg(feature = "liberty")]
     pub(crate) fn of_kind(&self) -> CheckLimits {
         let larger_limit = |check, edge| {
             let controls = [Control::Reset, Control::Set];

@@ -36,6 +36,7 @@ impl TimingArc {
     }
 
     /// The same in every corner.
+    #[cfg(feature = "liberty")]
     pub(crate) const fn fixed(delay: ArcDelay) -> Self {
         TimingArc {
             rise: Delay::fixed(delay.rise_fs),
@@ -137,6 +138,19 @@ impl Library {
     }
 
     /// Delay from input `pin` to the first output changing to `to`.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::logic::Logic;
+    /// use femtogate::netlist::{CellKind, Corner, Library};
+    ///
+    /// let library = Library::generic_40nm();
+    /// let [fast, typ, slow] =
+    ///     Corner::ALL.map(|corner| library.delay(CellKind::Inv, 0, Logic::Zero, corner));
+    /// assert!(fast < typ && typ < slow);
+    /// assert_eq!(typ.to_string(), "18.979 ps");
+    /// ```
     pub fn delay(&self, kind: CellKind, pin: usize, to: Logic, corner: Corner) -> Time {
         Time::from_fs(self.arcs(kind)[pin][0].delay_fs(corner, to) as i64)
     }

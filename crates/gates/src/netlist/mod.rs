@@ -17,6 +17,7 @@ mod corner;
 mod delay;
 mod error;
 mod flat;
+mod id;
 mod instance_limits;
 mod library;
 mod mismatch;
@@ -28,6 +29,7 @@ mod timing;
 mod variation;
 
 pub use builder::ModuleBuilder;
+#[cfg(feature = "yosys")]
 pub(crate) use builder::is_identifier;
 pub(crate) use cell::next_state;
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
@@ -36,7 +38,8 @@ pub use check_limits::{CheckKind, CheckLimits, DataLimit};
 pub use corner::{Corner, Delay, Edge};
 pub use delay::{ArcDelay, CellDelays, DelayModel};
 pub use error::NetlistError;
-pub use flat::{FlatCell, NetId, Netlist, Scope};
+pub use flat::{FlatCell, Netlist, Scope};
+pub use id::{CellId, NetId, ScopeId};
 pub use instance_limits::{Control, InstanceLimits};
 pub use library::{CellArcs, Library, TimingArc};
 pub use mismatch::Mismatch;

@@ -18,7 +18,8 @@ use super::cell::CellKind;
 use super::check_limits::CheckKind;
 use super::corner::Corner;
 use super::corner::Edge;
-use super::flat::{NetId, Netlist};
+use super::flat::Netlist;
+use super::id::{CellId, NetId};
 use super::library::Library;
 use super::static_timing::{Arrivals, Bound, Path, StaticTiming, TimingLoop};
 use crate::units::Time;
@@ -28,8 +29,8 @@ use crate::units::Time;
 pub struct Requirement {
     /// Setup, hold, clock high or clock low.
     pub kind: CheckKind,
-    /// Index of the flip-flop.
-    pub cell: usize,
+    /// The flip-flop.
+    pub cell: CellId,
     /// Edge of the clock that launches the data, or begins the pulse.
     pub launch: Edge,
     /// Edge of the clock that captures them, or ends the pulse.
@@ -122,16 +123,16 @@ impl<'n> Requirements<'n> {
         };
         for (cell, leaf) in netlist.cells().iter().enumerate() {
             if leaf.kind.is_flip_flop() {
-                found.add(cell, leaf.kind, library, corner);
+                found.add(CellId::new(cell), leaf.kind, library, corner);
             }
         }
         found
     }
 
-    fn add(&mut self, cell: usize, kind: CellKind, library: &Library, corner: Corner) {
+    fn add(&mut self, cell: CellId, kind: CellKind, library: &Library, corner: Corner) {
         let limits = library.checks(kind);
         let limit = |check, edge| Time::from_fs(limits.edge_limit_fs(check, edge, corner).into());
-        let leaf = &self.netlist.cells()[cell];
+        let leaf = &self.netlist.cells()[cell.index()];
         let (data, clock) = (leaf.input(0), leaf.input(1));
         for launch in Edge::BOTH {
             for capture in Edge::BOTH {
@@ -195,7 +196,7 @@ impl<'n> Requirements<'n> {
 
     /// The paths that a requirement is about: of the data (or the pulse's begin), and of the clock (or its end).
     pub fn paths(&self, requirement: &Requirement) -> Option<(Path, Path)> {
-        let leaf = &self.netlist.cells()[requirement.cell];
+        let leaf = &self.netlist.cells()[requirement.cell.index()];
         let (data, clock) = (leaf.input(0), leaf.input(1));
         let path =
             |after: Edge, net, edge, bound| self.arrivals[after as usize].path(net, edge, bound);
@@ -320,7 +321,7 @@ mod tests {
     fn a_period_is_rounded_up_and_a_broken_hold_has_none() {
         let requirement = |halves, fs| Requirement {
             kind: CheckKind::Hold,
-            cell: 0,
+            cell: CellId::new(0),
             launch: Edge::Rise,
             capture: Edge::Rise,
             edge: Edge::Rise,

@@ -20,7 +20,8 @@
 
 use super::cell::CellKind;
 use super::corner::Edge;
-use super::flat::{FlatCell, NetId, Netlist};
+use super::flat::{FlatCell, Netlist};
+use super::id::{CellId, NetId};
 use super::timing::Timing;
 use crate::units::Time;
 
@@ -73,11 +74,13 @@ pub fn caused(kind: CellKind, pin: usize, edge: Edge, output: usize) -> &'static
 
 /// Edges go round in a circle.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("edges come back to net {net}: name a net of the loop as a barrier")]
+#[error("edges come back to net {path}: name a net of the loop as a barrier")]
 #[non_exhaustive]
 pub struct TimingLoop {
     /// A net in or behind the loop.
-    pub net: String,
+    pub net: NetId,
+    /// Its dotted path.
+    pub path: String,
 }
 
 /// One netlist with its delays, ready for questions.
@@ -93,7 +96,7 @@ pub struct StaticTiming<'n> {
 /// One arc of the graph.
 struct ArcTo {
     to: Node,
-    cell: usize,
+    cell: CellId,
     pin: usize,
     output: usize,
 }
@@ -135,8 +138,8 @@ impl<'n> StaticTiming<'n> {
         let net = net_of(from).index();
         let loads = self.first_load[net] as usize..self.first_load[net + 1] as usize;
         self.loads[loads].iter().flat_map(move |&(cell, pin)| {
-            let (cell, pin) = (cell as usize, pin as usize);
-            let leaf = &self.netlist.cells()[cell];
+            let (cell, pin) = (CellId::new(cell as usize), pin as usize);
+            let leaf = &self.netlist.cells()[cell.index()];
             let outputs = leaf.outputs.iter().enumerate();
             outputs
                 .filter_map(|(output, net)| Some((output, (*net)?)))
@@ -157,6 +160,29 @@ impl<'n> StaticTiming<'n> {
     ///
     /// # Errors
     /// When edges come back to where they were without meeting a barrier.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{
+    ///     CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+    /// };
+    /// use femtogate::units::Time;
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    ///
+    /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+    /// let analysis = StaticTiming::new(&netlist, &timing);
+    /// let arrivals = analysis.arrivals(&[(a, Edge::Rise)], &[])?;
+    /// let falls = Time::from_fs(18_979);
+    /// assert_eq!(arrivals.edge_window(z, Edge::Fall), Some((falls, falls)));
+    /// assert_eq!(arrivals.edge_window(z, Edge::Rise), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn arrivals(
         &self,
         starts: &[(NetId, Edge)],
@@ -215,7 +241,7 @@ impl<'n> StaticTiming<'n> {
                 let level = edge_of(arc.to).level();
                 let delays = self.timing.cell_delays(cell);
                 let own = delays[pin][arc.output].delay_fs(level);
-                let leaf = &self.netlist.cells()[cell];
+                let leaf = &self.netlist.cells()[cell.index()];
                 let quickest = (0..leaf.kind.inputs().len())
                     .filter(|&other| leaf.kind.triggers(other) && can_change(leaf.input(other)))
                     .map(|other| delays[other][arc.output].delay_fs(level))
@@ -240,9 +266,10 @@ impl<'n> StaticTiming<'n> {
             }
         }
         if let Some(stuck) = (0..nodes).find(|&n| waiting_for[n] > 0) {
-            let net = self.netlist.net_path(net_of(stuck));
-            let net = net.unwrap_or_else(|| "without a name".to_owned());
-            return Err(TimingLoop { net });
+            let net = net_of(stuck);
+            let path = self.netlist.net_path(net);
+            let path = path.unwrap_or_else(|| "without a name".to_owned());
+            return Err(TimingLoop { net, path });
         }
         Ok(Arrivals {
             netlist: self.netlist,
@@ -256,7 +283,7 @@ impl<'n> StaticTiming<'n> {
 #[derive(Debug, Clone, Copy)]
 struct Cause {
     from: Node,
-    cell: usize,
+    cell: CellId,
     pin: usize,
 }
 
@@ -283,9 +310,9 @@ pub struct Arrivals<'n> {
 
 impl Arrivals<'_> {
     /// How long after its clock a flip-flop changes its own D, in the direction of `edge`, where D is one of its outputs.
-    pub(crate) fn own_data(&self, cell: usize, edge: Edge) -> Option<Time> {
+    pub(crate) fn own_data(&self, cell: CellId, edge: Edge) -> Option<Time> {
         const CLOCK: usize = 1;
-        let leaf = &self.netlist.cells()[cell];
+        let leaf = &self.netlist.cells()[cell.index()];
         let [data, ..] = leaf.inputs;
         let output = leaf.outputs.iter().position(|&net| net == data)?;
         let delay = self.timing.cell_delays(cell)[CLOCK][output].delay_fs(edge.level());
@@ -307,6 +334,27 @@ impl Arrivals<'_> {
     }
 
     /// The path to the earliest or latest change of `net` in the direction of `edge`.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{
+    ///     Bound, CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+    /// };
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    ///
+    /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+    /// let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(a, Edge::Rise)], &[])?;
+    /// let path = arrivals.path(z, Edge::Fall, Bound::Longest).unwrap();
+    /// assert_eq!(path.steps[0].net, a);
+    /// assert_eq!(path.steps[1].arc.as_deref(), Some("top.inverter INV A"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn path(&self, net: NetId, edge: Edge, bound: Bound) -> Option<Path> {
         let arrivals = match bound {
             Bound::Shortest => &self.shortest,
@@ -317,7 +365,7 @@ impl Arrivals<'_> {
         while let Some(index) = at {
             let arrival = arrivals[index]?;
             let cell = |cause: Cause| {
-                let kind = self.netlist.cells()[cause.cell].kind;
+                let kind = self.netlist.cells()[cause.cell.index()].kind;
                 let path = self.netlist.cell_path(cause.cell);
                 format!("{path} {} {}", kind.name(), kind.inputs()[cause.pin])
             };

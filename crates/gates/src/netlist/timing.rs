@@ -4,12 +4,12 @@
 //! back-annotation) gets a set of its own. So does one that delays as a wire does ([`DelayModel`]).
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use super::cell::CellKind;
 use super::corner::Corner;
 use super::delay::{CellDelays, DelayModel};
 use super::flat::Netlist;
+use super::id::CellId;
 use super::instance_limits::InstanceLimits;
 use super::library::Library;
 
@@ -24,21 +24,44 @@ pub struct Timing {
     of_cell: Vec<u32>,
     /// The library's limits by kind of cell, and those of single cells.
     limits: Vec<InstanceLimits>,
-    own_limits: BTreeMap<usize, InstanceLimits>,
+    own_limits: BTreeMap<CellId, InstanceLimits>,
 }
 
 impl Timing {
     /// Every cell as the library has it in this corner, or with the delay that is its own.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::{
+    ///     CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+    /// };
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+    ///
+    /// let library = Library::generic_40nm();
+    /// let [fast, slow] = [Corner::Fast, Corner::Slow].map(|corner| {
+    ///     let timing = Timing::nominal(&netlist, &library, corner);
+    ///     let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(a, Edge::Rise)], &[]);
+    ///     arrivals.unwrap().window(z).unwrap()
+    /// });
+    /// assert!(fast.1 < slow.0);
+    /// # Ok::<(), femtogate::netlist::NetlistError>(())
+    /// ```
     pub fn nominal(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
         Self::nominal_as(netlist, library, corner, |cell| netlist.cell_path(cell))
     }
 
-    /// The same where each cell is the one at `path` of its index, which says what elements of delay lines it has.
+    /// The same where each cell is the one at this path, which says what elements of delay lines it has.
     pub fn nominal_as(
         netlist: &Netlist,
         library: &Library,
         corner: Corner,
-        path: impl Fn(usize) -> String,
+        path: impl Fn(CellId) -> String,
     ) -> Self {
         Self::of_library(netlist, library, corner).with_own_delays(netlist, corner, path)
     }
@@ -49,7 +72,7 @@ impl Timing {
         mut self,
         netlist: &Netlist,
         corner: Corner,
-        path: impl Fn(usize) -> String,
+        path: impl Fn(CellId) -> String,
     ) -> Self {
         for &(cell, delay) in netlist.own_delays() {
             self.set(cell, delay.delays(|| path(cell), corner));
@@ -60,7 +83,8 @@ impl Timing {
 
     /// Gives the cells from `first` on the delays and limits of a block's, which is of as many cells. `known` is what this gave
     /// for the same block before: its sets are shared.
-    pub(crate) fn adopt(&mut self, first: usize, block: &Timing, known: Option<u32>) -> u32 {
+    #[cfg(feature = "liberty")]
+    pub(crate) fn adopt(&mut self, first: CellId, block: &Timing, known: Option<u32>) -> u32 {
         let base = known.unwrap_or_else(|| {
             let base = self.sets.len() as u32;
             self.sets.extend(&block.sets);
@@ -69,11 +93,11 @@ impl Timing {
             base
         });
         for (cell, &set) in block.of_cell.iter().enumerate() {
-            self.of_cell[first + cell] = base + set;
+            self.of_cell[first.index() + cell] = base + set;
         }
         let limits = block.own_limits.iter();
         self.own_limits
-            .extend(limits.map(|(&cell, &own)| (first + cell, own)));
+            .extend(limits.map(|(&cell, &own)| (CellId::new(first.index() + cell.index()), own)));
         base
     }
 
@@ -96,36 +120,36 @@ impl Timing {
 
     /// Delays of one cell.
     #[inline]
-    pub fn cell_delays(&self, cell: usize) -> &CellDelays {
-        &self.sets[self.of_cell[cell] as usize]
+    pub fn cell_delays(&self, cell: CellId) -> &CellDelays {
+        &self.sets[self.of_cell[cell.index()] as usize]
     }
 
     /// Gives one cell delays of its own.
-    pub fn set(&mut self, cell: usize, delays: CellDelays) {
+    pub fn set(&mut self, cell: CellId, delays: CellDelays) {
         let own = self.own_set(cell);
         self.sets[own] = delays;
     }
 
     /// How one cell delays: all its arcs alike, because a change of its output cancels one from any arc.
     #[inline]
-    pub fn model(&self, cell: usize) -> DelayModel {
-        self.models[self.of_cell[cell] as usize]
+    pub fn model(&self, cell: CellId) -> DelayModel {
+        self.models[self.of_cell[cell.index()] as usize]
     }
 
     /// Makes one cell delay in this way.
-    pub fn set_model(&mut self, cell: usize, model: DelayModel) {
+    pub fn set_model(&mut self, cell: CellId, model: DelayModel) {
         let own = self.own_set(cell);
         self.models[own] = model;
     }
 
     /// Limits of one cell, which is of this kind.
-    pub fn limits(&self, cell: usize, kind: CellKind) -> &InstanceLimits {
+    pub fn limits(&self, cell: CellId, kind: CellKind) -> &InstanceLimits {
         let own = self.own_limits.get(&cell);
         own.unwrap_or(&self.limits[kind as usize])
     }
 
     /// Gives one cell limits of its own.
-    pub fn set_limits(&mut self, cell: usize, limits: InstanceLimits) {
+    pub fn set_limits(&mut self, cell: CellId, limits: InstanceLimits) {
         self.own_limits.insert(cell, limits);
     }
 
@@ -137,25 +161,26 @@ impl Timing {
 
     /// The timing of some of the cells, of which the first becomes cell 0 of a netlist of their own.
     #[must_use]
-    pub fn part(&self, cells: Range<usize>) -> Self {
-        let own_limits = self.own_limits.range(cells.clone());
+    pub fn part(&self, cells: impl Iterator<Item = CellId> + Clone) -> Self {
+        let own_limits = cells.clone().enumerate().filter_map(|(place, cell)| {
+            let limits = self.own_limits.get(&cell)?;
+            Some((CellId::new(place), *limits))
+        });
         Timing {
-            own_limits: own_limits
-                .map(|(&cell, &limits)| (cell - cells.start, limits))
-                .collect(),
-            of_cell: self.of_cell[cells].to_vec(),
+            own_limits: own_limits.collect(),
+            of_cell: cells.map(|cell| self.of_cell[cell.index()]).collect(),
             is_own: vec![false; self.sets.len()],
             ..self.clone()
         }
     }
 
     /// Index of a set that is this cell's alone.
-    fn own_set(&mut self, cell: usize) -> usize {
-        let set = self.of_cell[cell] as usize;
+    fn own_set(&mut self, cell: CellId) -> usize {
+        let set = self.of_cell[cell.index()] as usize;
         if self.is_own[set] {
             return set;
         }
-        self.of_cell[cell] = self.sets.len() as u32;
+        self.of_cell[cell.index()] = self.sets.len() as u32;
         self.sets.push(self.sets[set]);
         self.models.push(self.models[set]);
         self.is_own.push(true);
@@ -168,8 +193,8 @@ impl Timing {
     }
 
     /// Index into [`Timing::sets`] by cell.
-    pub(crate) fn set_of(&self, cell: usize) -> u32 {
-        self.of_cell[cell]
+    pub(crate) fn set_of(&self, cell: CellId) -> u32 {
+        self.of_cell[cell.index()]
     }
 }
 
@@ -188,18 +213,21 @@ mod tests {
         m.gate(CellKind::Inv, &[b]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
-        let nominal = *timing.cell_delays(0);
+        let nominal = *timing.cell_delays(CellId::new(0));
         let slow = [[ArcDelay {
             rise_fs: 9,
             fall_fs: 8,
         }; MAX_OUTPUTS]; MAX_INPUTS];
-        timing.set(1, slow);
-        timing.set_model(1, DelayModel::Transport);
-        timing.set(1, slow);
-        assert_eq!(timing.model(0), DelayModel::Inertial);
-        assert_eq!(timing.model(1), DelayModel::Transport);
-        assert_eq!(*timing.cell_delays(0), nominal);
-        assert_eq!(*timing.cell_delays(1), slow);
-        assert_eq!(timing.cell_delays(1)[0][0].delay_fs(Logic::X), 8);
+        timing.set(CellId::new(1), slow);
+        timing.set_model(CellId::new(1), DelayModel::Transport);
+        timing.set(CellId::new(1), slow);
+        assert_eq!(timing.model(CellId::new(0)), DelayModel::Inertial);
+        assert_eq!(timing.model(CellId::new(1)), DelayModel::Transport);
+        assert_eq!(*timing.cell_delays(CellId::new(0)), nominal);
+        assert_eq!(*timing.cell_delays(CellId::new(1)), slow);
+        assert_eq!(
+            timing.cell_delays(CellId::new(1))[0][0].delay_fs(Logic::X),
+            8
+        );
     }
 }

@@ -18,6 +18,7 @@ use std::collections::BTreeSet;
 use super::cell::CellKind;
 use super::corner::Corner;
 use super::flat::Netlist;
+use super::id::CellId;
 use super::library::Library;
 use super::mismatch::Mismatch;
 use super::timing::Timing;
@@ -103,13 +104,13 @@ pub fn varied(
     })
 }
 
-/// The same where each cell is the one at `path` of its index: a netlist may stand for another that differs in names.
+/// The same where each cell is the one at this path: a netlist may stand for another that differs in names.
 pub fn varied_as(
     netlist: &Netlist,
     nominal: &Timing,
     factor: f64,
     mismatch: Option<Mismatch>,
-    path: impl Fn(usize) -> String,
+    path: impl Fn(CellId) -> String,
 ) -> Timing {
     let mut timing = nominal.clone();
     if factor == 1.0 && mismatch.is_none() {
@@ -117,17 +118,18 @@ pub fn varied_as(
     }
     let own_delays = netlist.own_delays().iter();
     let wires = own_delays.filter(|(_, delay)| !delay.mismatches);
-    let wires: BTreeSet<usize> = wires.map(|&(cell, _)| cell).collect();
+    let wires: BTreeSet<CellId> = wires.map(|&(cell, _)| cell).collect();
     for (index, cell) in netlist.cells().iter().enumerate() {
-        let mismatch = mismatch.filter(|_| !wires.contains(&index));
-        let own = mismatch.map_or(1.0, |m| m.factor(&path(index), cell.kind.transistors()));
+        let id = CellId::new(index);
+        let mismatch = mismatch.filter(|_| !wires.contains(&id));
+        let own = mismatch.map_or(1.0, |m| m.factor(&path(id), cell.kind.transistors()));
         let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
-        let mut delays = *nominal.cell_delays(index);
+        let mut delays = *nominal.cell_delays(id);
         for arc in delays.as_flattened_mut() {
             arc.rise_fs = scale(arc.rise_fs);
             arc.fall_fs = scale(arc.fall_fs);
         }
-        timing.set(index, delays);
+        timing.set(id, delays);
     }
     timing.scale_limits(factor);
     timing
@@ -199,7 +201,7 @@ mod tests {
             varied(&netlist, &timing(&library), 1.5, None),
             timing(&derated_limits(&library, 1.5)),
         );
-        let limits = |timing: &Timing| *timing.limits(0, CellKind::Dffr);
+        let limits = |timing: &Timing| *timing.limits(CellId::new(0), CellKind::Dffr);
         assert_eq!(limits(&slow), limits(&derated));
         assert_ne!(limits(&slow), limits(&timing(&library)));
     }

@@ -4,7 +4,10 @@ use std::collections::HashMap;
 
 use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, SkippedEntry};
 use crate::InputError;
-use crate::netlist::{ArcDelay, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing};
+use crate::netlist::{
+    ArcDelay, CellId, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing,
+};
+use crate::units::Time;
 
 /// What an annotation did.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -17,8 +20,8 @@ pub struct Annotation {
     pub checks: usize,
     /// Delays and limits that could not be taken over as they are.
     pub notes: Vec<SkippedEntry>,
-    /// Longest wire delay left out because it ends at a flip-flop's D, fs.
-    pub longest_wire_to_d_fs: i64,
+    /// Longest wire delay left out because it ends at a flip-flop's D.
+    pub longest_wire_to_d: Time,
 }
 
 impl Annotation {
@@ -36,6 +39,33 @@ const LONGEST_ARC: &str = "arcs with several delays, of which the longest is use
 /// # Errors
 /// Unknown instances, cell types and pins, wires between pins that are not connected, and sums that are
 /// negative or beyond 4.29 µs: line, reason and cure. `timing` is then only partly annotated.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::netlist::{
+///     CellKind, Corner, Edge, Library, ModuleBuilder, Netlist, StaticTiming, Timing,
+/// };
+/// use femtogate::sdf::{Sdf, annotate};
+/// use femtogate::units::Time;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+/// let mut timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+///
+/// let text = r#"(DELAYFILE (SDFVERSION "3.0") (TIMESCALE 1ps)
+///   (CELL (CELLTYPE "INV") (INSTANCE inverter)
+///     (DELAY (ABSOLUTE (IOPATH A Z (60.0) (50.0)))))
+/// )"#;
+/// let sdf = Sdf::parse("layout.sdf", text)?;
+/// assert_eq!(annotate(&mut timing, &netlist, &sdf, Corner::Typ)?.arcs, 1);
+/// let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(a, Edge::Rise)], &[])?;
+/// assert_eq!(arrivals.window(z).unwrap().1, Time::from_ps(50));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn annotate(
     timing: &mut Timing,
     netlist: &Netlist,
@@ -59,10 +89,10 @@ pub fn annotate(
     Ok(annotator.result)
 }
 
-fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<usize>> {
-    let mut cells: HashMap<CellKind, Vec<usize>> = HashMap::new();
+fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<CellId>> {
+    let mut cells: HashMap<CellKind, Vec<CellId>> = HashMap::new();
     for (index, cell) in netlist.cells().iter().enumerate() {
-        cells.entry(cell.kind).or_default().push(index);
+        cells.entry(cell.kind).or_default().push(CellId::new(index));
     }
     cells
 }
@@ -71,7 +101,7 @@ fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<usize>> {
 type ArcSlots = [[[Option<i64>; 2]; 2]; 2];
 
 /// Delays of the stages (rise, fall, fs) by cell, and the line of the last of them.
-pub(super) type Stages = HashMap<usize, (Vec<[i64; 2]>, usize)>;
+pub(super) type Stages = HashMap<CellId, (Vec<[i64; 2]>, usize)>;
 
 /// The wire to one input pin.
 pub(super) struct Wire {
@@ -82,10 +112,10 @@ pub(super) struct Wire {
 
 pub(super) struct Annotator<'n, 's, 'a> {
     pub(super) netlist: &'n Netlist,
-    of_kind: HashMap<CellKind, Vec<usize>>,
+    of_kind: HashMap<CellKind, Vec<CellId>>,
     sdf: &'s Sdf<'a>,
     pub(super) corner: Corner,
-    pub(super) wires: HashMap<(usize, usize), Wire>,
+    pub(super) wires: HashMap<(CellId, usize), Wire>,
     pub(super) stages: Stages,
     pub(super) result: Annotation,
 }
@@ -124,7 +154,7 @@ impl Annotator<'_, '_, '_> {
             }
             (SdfInstance::Path(path), _) => {
                 let (name, wanted) = if let Some(cell) = self.netlist.cell(path) {
-                    let name = self.netlist.cells()[cell].kind.name();
+                    let name = self.netlist.cells()[cell.index()].kind.name();
                     if name == entry.cell_type {
                         return self.leaf(timing, entry, cell);
                     }
@@ -132,7 +162,7 @@ impl Annotator<'_, '_, '_> {
                 } else if let Some(stage) = Chain::find(self.netlist, path) {
                     return self.stage(timing, entry, stage);
                 } else if let Some(scope) = self.netlist.scope(path) {
-                    let name = self.netlist.scopes()[scope].module.name();
+                    let name = self.netlist.scopes()[scope.index()].module.name();
                     if name == entry.cell_type {
                         return self.module(entry, path);
                     }
@@ -171,8 +201,8 @@ impl Annotator<'_, '_, '_> {
             Some(path)
         });
         let is_there = |path: &&str| {
-            let [cell, scope] = [self.netlist.cell(path), self.netlist.scope(path)];
-            !path.is_empty() && (cell.is_some() || scope.is_some())
+            let is_cell = self.netlist.cell(path).is_some();
+            !path.is_empty() && (is_cell || self.netlist.scope(path).is_some())
         };
         below.find(is_there).map(str::to_owned)
     }
@@ -197,10 +227,10 @@ impl Annotator<'_, '_, '_> {
         &mut self,
         timing: &mut Timing,
         entry: &SdfCell<'_>,
-        cell: usize,
+        cell: CellId,
     ) -> Result<(), InputError> {
         self.limits(timing, entry, cell)?;
-        let kind = self.netlist.cells()[cell].kind;
+        let kind = self.netlist.cells()[cell.index()].kind;
         let mut slots: [ArcSlots; MAX_INPUTS] = Default::default();
         let mut last_line = [entry.line; MAX_INPUTS];
         for delay in &entry.delays {
@@ -287,7 +317,7 @@ impl Annotator<'_, '_, '_> {
                 continue;
             }
             for (slot, (value, before)) in slot.iter_mut().zip(values) {
-                if let Some(fs) = value.in_corner_fs(self.corner) {
+                if let Some(fs) = value.in_corner_fs(self.corner).map(Time::as_fs) {
                     *slot = Some(if delay.increment {
                         slot.unwrap_or(before as i64) + fs
                     } else {

@@ -6,6 +6,7 @@ use super::parser::{Parser, Result};
 use super::tokens::Token;
 use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, SkippedEntry, Triple};
 use crate::netlist::Edge;
+use crate::units::Time;
 
 /// Longest delay or limit, fs: 4.29 µs, what delays are stored in.
 const LONGEST_FS: f64 = u32::MAX as f64;
@@ -77,7 +78,7 @@ impl<'a> Parser<'a, '_> {
             } else {
                 self.triple()?
             };
-            if !may_be_negative && value.0.iter().flatten().any(|&fs| fs < 0) {
+            if !may_be_negative && value.0.iter().flatten().any(|&time| time < Time::ZERO) {
                 return self.error("an absolute delay is negative; give 0 or more");
             }
             values.push(value);
@@ -105,7 +106,7 @@ impl<'a> Parser<'a, '_> {
                 Token::Close => break,
                 Token::Colon if at < 2 => at += 1,
                 Token::Word(word) if members[at].is_none() => {
-                    members[at] = Some(self.number(word)?);
+                    members[at] = Some(Time::from_fs(self.number(word)?));
                 }
                 token => return self.unexpected(token, "a number, min:typ:max or )"),
             }
@@ -125,7 +126,7 @@ impl<'a> Parser<'a, '_> {
             return self.unexpected(Token::Word(word), "a number");
         };
         // Below 2³² fs, 53 bits hold every decimal fraction to far less than half a femtosecond.
-        let fs = value * self.header.timescale_fs as f64;
+        let fs = value * self.header.timescale.as_fs() as f64;
         if fs.is_finite() && fs.abs() <= LONGEST_FS {
             Ok(fs.round() as i64)
         } else {

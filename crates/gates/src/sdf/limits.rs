@@ -13,7 +13,8 @@
 use super::annotate::Annotator;
 use super::{CheckKeyword as Entry, PinEdge, SdfCell, SdfCheck, Triple};
 use crate::InputError;
-use crate::netlist::{CellKind, CheckKind, Control, Edge, InstanceLimits, Timing};
+use crate::netlist::{CellId, CellKind, CheckKind, Control, Edge, InstanceLimits, Timing};
+use crate::units::Time;
 
 const NO_SUCH_CHECK: &str = "checks of pins or edges that a flip-flop does not act on";
 const NEGATIVE: &str = "negative limits, which become 0";
@@ -46,9 +47,9 @@ impl Annotator<'_, '_, '_> {
         &mut self,
         timing: &mut Timing,
         entry: &SdfCell<'_>,
-        cell: usize,
+        cell: CellId,
     ) -> Result<(), InputError> {
-        let kind = self.netlist.cells()[cell].kind;
+        let kind = self.netlist.cells()[cell.index()].kind;
         let before = *timing.limits(cell, kind);
         let mut limits = before;
         for check in &entry.checks {
@@ -68,14 +69,14 @@ impl Annotator<'_, '_, '_> {
             // Two limits are one for each of two slots; one limit may be for both.
             let of_slot = [0, check.kind.limits() - 1].map(|limit| check.limits[limit]);
             for (slot, limit) in slots.into_iter().zip(of_slot) {
-                let (Some(slot), Some(fs)) = (slot, limit.in_corner_fs(self.corner)) else {
+                let (Some(slot), Some(limit)) = (slot, limit.in_corner_fs(self.corner)) else {
                     continue;
                 };
-                if fs < 0 {
+                if limit < Time::ZERO {
                     self.note(NEGATIVE, check.line);
                 }
                 // The parser lets nothing beyond 32 bits through.
-                enter(&mut limits, slot, u32::try_from(fs).unwrap_or(0));
+                enter(&mut limits, slot, u32::try_from(limit.as_fs()).unwrap_or(0));
             }
         }
         if limits != before {
@@ -133,7 +134,10 @@ fn enter(limits: &mut InstanceLimits, (check, control, edge): Slot, fs: u32) {
 /// The checks of a flip-flop with these limits in the three corners.
 pub(crate) fn checks_of(kind: CellKind, corners: [&InstanceLimits; 3]) -> Vec<SdfCheck<'static>> {
     let limit = |control, check, edge| {
-        Triple(corners.map(|limits| Some(limits.limit_fs(control, check, edge).into())))
+        Triple(corners.map(|limits| {
+            let fs = limits.limit_fs(control, check, edge);
+            Some(Time::from_fs(fs.into()))
+        }))
     };
     let pin = |edge, pin: &'static str| PinEdge {
         edge: Some(edge),
@@ -178,19 +182,19 @@ mod tests {
     use super::super::tests::{annotated, design, export, nominal};
     use super::super::{Annotation, Sdf, SdfOptions, annotate};
     use super::*;
-    use crate::netlist::Corner;
+    use crate::netlist::{Corner, ScopeId};
 
     fn limits_of(body: &str, path: &str) -> (InstanceLimits, Annotation) {
         let (netlist, timing, result) = annotated(body).unwrap();
         let cell = netlist.cell(path).unwrap();
-        let kind = netlist.cells()[cell].kind;
+        let kind = netlist.cells()[cell.index()].kind;
         (*timing.limits(cell, kind), result)
     }
 
     #[test]
     fn limits_reach_the_instance_the_check_and_the_edge_they_are_for() {
         use crate::netlist::CheckKind as Check;
-        let nominal = *nominal(&design(), Corner::Typ).limits(0, CellKind::Dffsr);
+        let nominal = *nominal(&design(), Corner::Typ).limits(CellId::new(0), CellKind::Dffsr);
         let body = |checks: &str| {
             format!("(CELL (CELLTYPE \"DFFSR\") (INSTANCE u1/dffsr) (TIMINGCHECK {checks}))")
         };
@@ -324,7 +328,7 @@ mod tests {
         for (corner, wanted) in Corner::ALL.into_iter().zip(&corners) {
             let mut timing = nominal(&netlist, Corner::Typ);
             annotate(&mut timing, &netlist, &sdf, corner).unwrap();
-            for (cell, flat) in netlist.cells().iter().enumerate() {
+            for (cell, flat) in netlist.cells_below(ScopeId::TOP).zip(netlist.cells()) {
                 if flat.kind.is_flip_flop() {
                     let [found, wanted] = [&timing, wanted].map(|t| exported(t, cell, flat.kind));
                     assert_eq!(found, wanted, "{}", netlist.cell_path(cell));
@@ -334,7 +338,7 @@ mod tests {
     }
 
     /// What a file says of a flip-flop: nothing of S where it has none.
-    fn exported(timing: &Timing, cell: usize, kind: CellKind) -> Vec<SdfCheck<'static>> {
+    fn exported(timing: &Timing, cell: CellId, kind: CellKind) -> Vec<SdfCheck<'static>> {
         checks_of(kind, [timing.limits(cell, kind); 3])
     }
 }

@@ -59,6 +59,7 @@ pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_library_sdf, write_
 use std::borrow::Cow;
 
 use crate::netlist::{Corner, Edge};
+use crate::units::Time;
 
 /// The dotted path of a name in a scope; the empty path is the top.
 fn join(path: &str, name: &str) -> String {
@@ -69,18 +70,18 @@ fn join(path: &str, name: &str) -> String {
     }
 }
 
-/// Minimum, typical and maximum of a number, fs; members may be missing.
+/// Minimum, typical and maximum of a time; members may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Triple(pub [Option<i64>; 3]);
+pub struct Triple(pub [Option<Time>; 3]);
 
 impl Triple {
-    /// The same in every corner, fs.
-    pub const fn fixed(fs: i64) -> Self {
-        Triple([Some(fs); 3])
+    /// The same in every corner.
+    pub const fn fixed(time: Time) -> Self {
+        Triple([Some(time); 3])
     }
 
-    /// The member of one corner, fs.
-    pub const fn in_corner_fs(self, corner: Corner) -> Option<i64> {
+    /// The member of one corner.
+    pub const fn in_corner_fs(self, corner: Corner) -> Option<Time> {
         self.0[corner as usize]
     }
 }
@@ -241,8 +242,8 @@ pub struct SdfHeader<'a> {
     pub texts: Vec<(&'static str, Cow<'a, str>)>,
     /// Between names of a path: `.` or `/`.
     pub divider: char,
-    /// What 1 stands for, fs.
-    pub timescale_fs: u64,
+    /// What 1 stands for.
+    pub timescale: Time,
 }
 
 /// Something left out of a file or an annotation.

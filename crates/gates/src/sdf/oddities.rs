@@ -5,6 +5,7 @@ use std::fmt;
 
 use super::{DelayPath, Sdf, SdfCell, SdfDelay, SdfInstance};
 use crate::netlist::Corner;
+use crate::units::Time;
 
 /// One of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +81,11 @@ pub fn oddities(sdf: &Sdf<'_>, corner: Corner) -> Vec<Oddity> {
     let (mut all, mut zeros, mut line) = (0, 0, 0);
     for delay in arcs {
         all += 1;
-        if given(delay).into_iter().flatten().all(|fs| fs == 0) {
+        if given(delay)
+            .into_iter()
+            .flatten()
+            .all(|time| time == Time::ZERO)
+        {
             zeros += 1;
             if zeros == 1 {
                 line = delay.line;

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use super::tokens::{Token, Tokens};
 use super::{Sdf, SdfCell, SdfHeader, SdfInstance, SkippedEntry};
 use crate::InputError;
+use crate::units::Time;
 
 const HEADER_TEXTS: [&str; 9] = [
     "SDFVERSION",
@@ -49,7 +50,7 @@ impl<'a> Sdf<'a> {
             header: SdfHeader {
                 texts: Vec::new(),
                 divider: '.',
-                timescale_fs: 1_000_000,
+                timescale: Time::from_ns(1),
             },
             skipped: Vec::new(),
         };
@@ -222,7 +223,7 @@ impl<'a> Parser<'a, '_> {
                         "{text} is not a time scale; give 1, 10 or 100 and s, ms, us, ns, ps or fs"
                     ));
                 };
-                self.header.timescale_fs = scale;
+                self.header.timescale = Time::from_fs(scale);
                 self.close()
             }
             _ => {
@@ -323,7 +324,7 @@ impl<'a> Parser<'a, '_> {
     }
 }
 
-fn timescale_fs(text: &str) -> Option<u64> {
+fn timescale_fs(text: &str) -> Option<i64> {
     let split = text.find(|c: char| c.is_ascii_alphabetic())?;
     let (number, unit) = text.split_at(split);
     let factor = match number {
@@ -360,7 +361,7 @@ mod tests {
                 ("100", 100),
                 ("100.0", 100),
             ] {
-                let wanted = Some(factor * 1000u64.pow(thousands));
+                let wanted = Some(factor * 1000i64.pow(thousands));
                 assert_eq!(
                     timescale_fs(&format!("{number}{unit}")),
                     wanted,

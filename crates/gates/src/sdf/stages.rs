@@ -3,7 +3,8 @@
 use super::annotate::Annotator;
 use super::{DelayPath, SdfCell};
 use crate::InputError;
-use crate::netlist::{ArcDelay, Chain, MAX_INPUTS, MAX_OUTPUTS, Timing};
+use crate::netlist::{ArcDelay, CellId, Chain, MAX_INPUTS, MAX_OUTPUTS, Timing};
+use crate::units::Time;
 
 impl Annotator<'_, '_, '_> {
     /// Takes the delays of one stage.
@@ -11,7 +12,7 @@ impl Annotator<'_, '_, '_> {
         &mut self,
         timing: &Timing,
         entry: &SdfCell<'_>,
-        (cell, chain, number): (usize, Chain, usize),
+        (cell, chain, number): (CellId, Chain, usize),
     ) -> Result<(), InputError> {
         let module = chain.stage_module();
         if module != entry.cell_type {
@@ -39,7 +40,7 @@ impl Annotator<'_, '_, '_> {
             });
             *line = delay.line;
             for (member, value) in stages[number].iter_mut().zip([delay.rise, delay.fall]) {
-                if let Some(fs) = value.in_corner_fs(self.corner) {
+                if let Some(fs) = value.in_corner_fs(self.corner).map(Time::as_fs) {
                     *member = fs + if delay.increment { *member } else { 0 };
                 }
             }

@@ -3,7 +3,7 @@
 use super::annotate::{Annotator, Wire, causes};
 use super::{SdfDelay, join};
 use crate::InputError;
-use crate::netlist::{Direction, Edge, NetId, Timing};
+use crate::netlist::{CellId, Direction, Edge, NetId, Timing};
 
 const WIRE_TO_D: &str = "wires to D of a flip-flop";
 const WIRE_TO_OUTPUT: &str = "wires to outputs of the chip";
@@ -22,7 +22,7 @@ impl Annotator<'_, '_, '_> {
         if let Some((instance, name)) = target.rsplit_once('.')
             && let Some(cell) = self.netlist.cell(instance)
         {
-            let flat = self.netlist.cells()[cell];
+            let flat = self.netlist.cells()[cell.index()];
             let pin = self.input(flat.kind, name, delay.line)?;
             if source.is_none() || flat.inputs[pin] != source {
                 let message = format!("{from} and {to} are not connected; correct one of the two");
@@ -48,7 +48,7 @@ impl Annotator<'_, '_, '_> {
         if let Some((instance, name)) = full.rsplit_once('.')
             && let Some(cell) = self.netlist.cell(instance)
         {
-            let flat = self.netlist.cells()[cell];
+            let flat = self.netlist.cells()[cell.index()];
             let output = self.output(flat.kind, name, line)?;
             return Ok(flat.outputs[output]);
         }
@@ -68,12 +68,13 @@ impl Annotator<'_, '_, '_> {
         }
     }
 
-    pub(super) fn wire(&mut self, cell: usize, pin: usize, delay: &SdfDelay<'_>) {
-        let kind = self.netlist.cells()[cell].kind;
+    pub(super) fn wire(&mut self, cell: CellId, pin: usize, delay: &SdfDelay<'_>) {
+        let kind = self.netlist.cells()[cell.index()].kind;
         let values = [delay.rise, delay.fall].map(|triple| triple.in_corner_fs(self.corner));
         if !kind.triggers(pin) {
-            let longest = values.into_iter().flatten().max().unwrap_or(0);
-            self.result.longest_wire_to_d_fs = self.result.longest_wire_to_d_fs.max(longest);
+            let longest = values.into_iter().flatten().max().unwrap_or_default();
+            let longest = self.result.longest_wire_to_d.max(longest);
+            self.result.longest_wire_to_d = longest;
             self.note(WIRE_TO_D, delay.line);
             return;
         }
@@ -90,8 +91,8 @@ impl Annotator<'_, '_, '_> {
             .into_iter()
             .zip(values)
         {
-            if let Some(fs) = value {
-                *member = fs + if delay.increment { *member } else { 0 };
+            if let Some(time) = value {
+                *member = time.as_fs() + if delay.increment { *member } else { 0 };
             }
         }
     }
@@ -101,7 +102,7 @@ impl Annotator<'_, '_, '_> {
         // In the order of the file, so that the first mistake is the one reported.
         wires.sort_unstable_by_key(|((cell, pin), wire)| (wire.line, *cell, *pin));
         for ((cell, pin), wire) in wires {
-            let kind = self.netlist.cells()[cell].kind;
+            let kind = self.netlist.cells()[cell.index()].kind;
             let mut delays = *timing.cell_delays(cell);
             let mut unequal = false;
             let arcs = delays[pin][..kind.outputs().len()].iter_mut();

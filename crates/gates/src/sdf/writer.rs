@@ -8,8 +8,9 @@ use super::{PinEdge, SdfCheck, Triple, join};
 use crate::Origin;
 use crate::netlist::{
     ArcDelay, Cell, CellDelays, CellKind, Chain, Corner, Edge, InstanceLimits, Library, MAX_INPUTS,
-    MAX_OUTPUTS, Module, Netlist, Timing,
+    MAX_OUTPUTS, Module, Netlist, ScopeId, Timing,
 };
+use crate::units::Time;
 
 /// What stands between the names of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,6 +58,27 @@ pub struct SdfOptions {
 ///
 /// # Errors
 /// Those of the writer.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::sdf::{Sdf, SdfOptions, write_sdf};
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let library = Library::generic_40nm();
+/// let corners = Corner::ALL.map(|corner| Timing::nominal(&netlist, &library, corner));
+/// let mut text = Vec::new();
+/// write_sdf(&mut text, &netlist, corners.each_ref(), SdfOptions::default())?;
+///
+/// let text = String::from_utf8(text)?;
+/// let sdf = Sdf::parse("top.sdf", &text)?;
+/// assert_eq!((sdf.cells.len(), &*sdf.cells[0].cell_type), (1, "INV"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_sdf(
     out: &mut dyn Write,
     netlist: &Netlist,
@@ -66,10 +88,11 @@ pub fn write_sdf(
     let design = netlist.scopes()[0].module.name();
     write_head(out, design, options)?;
     for (index, scope) in netlist.scopes().iter().enumerate() {
+        let id = ScopeId::new(index);
         // Paths start below the top.
-        let path = netlist.scope_path(index);
+        let path = netlist.scope_path(id);
         let path = path[design.len()..].trim_start_matches('.');
-        for (cell, leaf) in netlist.cells_of(index).zip(scope.module.cells()) {
+        for (cell, leaf) in netlist.cells_of(id).zip(scope.module.cells()) {
             let delays = corners.map(|timing| *timing.cell_delays(cell));
             let limits = corners.map(|timing| timing.limits(cell, leaf.kind));
             write_cell(out, &join(path, &leaf.name), leaf, delays, limits, options)?;
@@ -211,8 +234,14 @@ fn body(
         });
         for (number, output) in kind.outputs().iter().enumerate() {
             let arcs = delays.map(|delays| delays[pin][number]);
-            let rise = triple(Triple(arcs.map(|arc| Some(arc.rise_fs.into()))), timescale);
-            let fall = triple(Triple(arcs.map(|arc| Some(arc.fall_fs.into()))), timescale);
+            let rise = triple(
+                Triple(arcs.map(|arc| Some(Time::from_fs(arc.rise_fs.into())))),
+                timescale,
+            );
+            let fall = triple(
+                Triple(arcs.map(|arc| Some(Time::from_fs(arc.fall_fs.into())))),
+                timescale,
+            );
             text += &format!("      (IOPATH {from} {output} {rise} {fall})\n");
         }
     }
@@ -244,7 +273,7 @@ fn pin_edge(pin: &PinEdge<'_>) -> String {
 }
 
 fn triple(triple: Triple, timescale: SdfTimescale) -> String {
-    let number = |fs: Option<i64>| match (fs, timescale) {
+    let number = |time: Option<Time>| match (time.map(Time::as_fs), timescale) {
         (None, _) => String::new(),
         (Some(fs), SdfTimescale::Fs) => fs.to_string(),
         (Some(fs), SdfTimescale::Ps) => {
@@ -266,7 +295,10 @@ mod tests {
 
     #[test]
     fn members_of_a_triple_are_written_where_they_differ() {
-        let text = |members: [Option<i64>; 3], timescale| triple(Triple(members), timescale);
+        let text = |members: [Option<i64>; 3], timescale| {
+            let members = members.map(|fs| fs.map(Time::from_fs));
+            triple(Triple(members), timescale)
+        };
         let (fs, ps) = (SdfTimescale::Fs, SdfTimescale::Ps);
         assert_eq!(text([Some(1_250); 3], ps), "(1.250)");
         assert_eq!(text([Some(1), Some(2), Some(2)], fs), "(1:2:2)");

@@ -9,6 +9,19 @@ use super::Time;
 const FS_PER_S: i128 = 1_000_000_000_000_000;
 
 /// An exact clock frequency, a ratio of integers in hertz.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::units::{Frequency, Time};
+///
+/// // A period of 384 MHz is 15625/6 ps; errors of rounding do not add up.
+/// let clock = Frequency::from_hz(384_000_000);
+/// assert_eq!(clock.period(), Time::from_fs(2_604_167));
+/// assert_eq!(clock.periods(6), Time::from_ps(15_625));
+/// assert_eq!(Frequency::from_period(Time::from_ns(2))?, Frequency::from_hz(500_000_000));
+/// # Ok::<(), femtogate::units::FrequencyError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Frequency {
     numerator: u64,

@@ -6,8 +6,21 @@
 use std::fmt;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// A point in time or a duration, in whole femtoseconds.
+/// A point in time or a duration, in whole femtoseconds. For serde it is that number.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::units::Time;
+///
+/// let delay = Time::from_ns(2) + Time::from_ps(500);
+/// assert_eq!(delay, Time::from_fs(2_500_000));
+/// assert_eq!((delay.as_ns(), delay.to_string()), (2.5, "2.500 ns".to_owned()));
+/// assert!(Time::ZERO - delay < Time::ZERO);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(transparent))]
 pub struct Time(i64);
 
 impl Time {

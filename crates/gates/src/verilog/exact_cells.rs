@@ -24,7 +24,9 @@ use std::io::{self, Write};
 
 use super::{TIMESCALE, primitive};
 use crate::logic::Logic;
-use crate::netlist::{CellArcs, CellKind, Chain, Corner, DelayModel, Library, Netlist, Timing};
+use crate::netlist::{
+    CellArcs, CellKind, Chain, Corner, DelayModel, Library, Netlist, ScopeId, Timing,
+};
 
 /// Lets every change of `value` arrive after its delay. One that overtakes others cancels them. The queue's last place
 /// has a variable, as an index that is a difference need not wrap at 8 bits.
@@ -145,8 +147,9 @@ pub fn write_delays(
 ) -> io::Result<()> {
     let top = netlist.scopes()[0].name.len();
     for (index, scope) in netlist.scopes().iter().enumerate() {
-        let path = format!("{instance}{}", &netlist.scope_path(index)[top..]);
-        for (cell, leaf) in netlist.cells_of(index).zip(scope.module.cells()) {
+        let id = ScopeId::new(index);
+        let path = format!("{instance}{}", &netlist.scope_path(id)[top..]);
+        for (cell, leaf) in netlist.cells_of(id).zip(scope.module.cells()) {
             if timing.model(cell) == DelayModel::Transport {
                 writeln!(out, "  defparam {path}.{}.TRANSPORT = 1;", leaf.name)?;
             }

@@ -14,6 +14,7 @@ mod standard_cells;
 pub use exact_cells::{write_cells, write_delays, write_parametric_cells};
 pub use modules::write_modules;
 pub use standard_cells::write_standard_cells;
+#[cfg(feature = "liberty")]
 pub(super) use standard_cells::{DFFSR_STATE, HEAD};
 
 use crate::netlist::CellKind;

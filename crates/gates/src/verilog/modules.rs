@@ -24,6 +24,23 @@ const LINT: &str = "
 ///
 /// # Errors
 /// Those of the writer.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::netlist::{CellKind, ModuleBuilder};
+/// use femtogate::verilog::write_modules;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let mut verilog = Vec::new();
+/// write_modules(&mut verilog, &m.finish()?)?;
+/// let verilog = String::from_utf8(verilog)?;
+/// assert!(verilog.contains("module top"));
+/// assert!(verilog.contains("INV inverter"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_modules(out: &mut dyn Write, top: &Shared<Module>) -> io::Result<()> {
     write!(out, "{TIMESCALE}{LINT}")?;
     write_below(out, top, &mut HashSet::new())

@@ -27,6 +27,7 @@ use std::io::{self, Write};
 use super::primitive;
 use crate::netlist::{CellKind, Chain, Corner, Delay, Edge, InstanceLimits, Library};
 use crate::sdf::{CheckKeyword, PinEdge, SdfCheck, checks_of};
+use crate::units::Time;
 
 /// What a file of cells begins with.
 pub(crate) const HEAD: &str = "\
@@ -279,7 +280,7 @@ fn write_specify(
 /// One check. SDF names the data first; in Verilog they come first where a control is released, and second for D.
 fn system_task(check: &SdfCheck<'_>, reader: Reader) -> String {
     let [first, second] = check.limits.map(|limit| {
-        let corners = Corner::ALL.map(|corner| limit.in_corner_fs(corner).unwrap_or(0));
+        let corners = Corner::ALL.map(|corner| limit.in_corner_fs(corner).map_or(0, Time::as_fs));
         reader.triple(corners)
     });
     let data = event(&check.pin);

@@ -33,6 +33,32 @@ impl<W: Read + Write + Seek> FstWriter<W> {
     ///
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use std::io::Cursor;
+    ///
+    /// use femtogate::kernel::{Drive, Kernel, Stimulus};
+    /// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+    /// use femtogate::units::Time;
+    /// use femtogate::waves::{FstWriter, Selection};
+    ///
+    /// let mut m = ModuleBuilder::new("top");
+    /// let (a, z) = (m.input("A"), m.output("Z"));
+    /// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+    /// let netlist = Netlist::elaborate(&m.finish()?);
+    /// let a = netlist.net("A").unwrap();
+    /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+    /// let file = Cursor::new(Vec::new()); // or a `File` that can be read, too
+    /// let mut waves = FstWriter::new(file, &netlist, &Selection::all())?;
+    /// let mut kernel = Kernel::new(&netlist, &timing);
+    /// let mut stimulus = Stimulus::new([Drive::new(Time::from_ns(1), a, true)]);
+    /// kernel.run(&mut stimulus, Time::from_ns(2), &mut waves)?;
+    /// let bytes = waves.finish(kernel.now())?.into_inner();
+    /// assert_eq!(bytes[..9], [0, 0, 0, 0, 0, 0, 0, 1, 73]); // a header of 329 bytes
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(out: W, netlist: &Netlist, selection: &WaveSelection) -> io::Result<Self> {
         Self::with_origin(out, netlist, selection, Origin::default())
     }

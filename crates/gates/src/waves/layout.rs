@@ -141,7 +141,7 @@ impl SignalShape {
         let (scope, name) = path.rsplit_once('.').unwrap_or(("", path));
         let signal = netlist
             .scope(scope)
-            .and_then(|scope| netlist.scopes()[scope].module.signal(name))
+            .and_then(|scope| netlist.scopes()[scope.index()].module.signal(name))
             .ok_or_else(|| no_such("signal", path, netlist))?;
         Ok(SignalShape {
             width: signal.width(),

@@ -32,6 +32,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#[cfg(feature = "fst")]
 mod fst;
 mod gtkw;
 mod layout;
@@ -42,6 +43,7 @@ mod variables;
 mod vcd;
 mod writer;
 
+#[cfg(feature = "fst")]
 pub use fst::{Fst, FstWriter};
 pub use layout::{Entry, Layout, Mark, Radix, SignalGroup, mark};
 pub use saif::write_saif;

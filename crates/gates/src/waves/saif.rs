@@ -22,6 +22,31 @@ use crate::units::Time;
 ///
 /// # Errors
 /// Those of `out`.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::Origin;
+/// use femtogate::kernel::{Activity, Drive, Kernel, Stimulus};
+/// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
+/// use femtogate::units::Time;
+/// use femtogate::waves::write_saif;
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let a = netlist.net("A").unwrap();
+/// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+/// let mut activity = Activity::new(&netlist, Time::ZERO);
+/// let mut stimulus = Stimulus::new([Drive::new(Time::from_ns(1), a, true)]);
+/// let end = Time::from_ns(2);
+/// Kernel::new(&netlist, &timing).run(&mut stimulus, end, &mut activity)?;
+/// let mut saif = Vec::new();
+/// write_saif(&mut saif, &netlist, &activity.until(end), end, false, Origin::default())?;
+/// assert!(String::from_utf8(saif)?.contains("(DURATION 2000000)"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_saif(
     out: &mut dyn Write,
     netlist: &Netlist,

@@ -9,6 +9,26 @@ use std::io;
 use crate::netlist::Netlist;
 
 /// What part of the hierarchy to dump. Starts as [`WaveSelection::all`] and is narrowed from there.
+///
+/// # Example
+///
+/// ```
+/// use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+/// use femtogate::units::Time;
+/// use femtogate::waves::{WaveSelection, VcdWriter};
+///
+/// let mut m = ModuleBuilder::new("top");
+/// let (a, z) = (m.input("A"), m.output("Z"));
+/// m.cell("inverter", CellKind::Inv, &[a], &[z]);
+/// let netlist = Netlist::elaborate(&m.finish()?);
+/// let whole = VcdWriter::new(Vec::new(), &netlist, &WaveSelection::all())?;
+/// let text = String::from_utf8(whole.finish(Time::from_ns(1))?)?;
+/// assert!(text.contains("$scope module top $end"));
+///
+/// let nowhere = WaveSelection::all().below("nowhere");
+/// assert!(VcdWriter::new(Vec::new(), &netlist, &nowhere).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WaveSelection {
     below: Vec<String>,
@@ -81,10 +101,10 @@ impl WaveSelection {
             let scope = netlist
                 .scope(path)
                 .ok_or_else(|| no_such("instance", path, netlist))?;
-            levels[scope] = Some(self.depth);
+            levels[scope.index()] = Some(self.depth);
         }
         for i in 1..scopes.len() {
-            let inherited = levels[scopes[i].parent].and_then(|left| left.checked_sub(1));
+            let inherited = levels[scopes[i].parent.index()].and_then(|left| left.checked_sub(1));
             levels[i] = levels[i].max(inherited);
         }
         let mut coverage: Vec<Coverage> = levels
@@ -96,7 +116,7 @@ impl WaveSelection {
             .collect();
         // Parents come before their children, so going backwards completes every path.
         for i in (1..scopes.len()).rev() {
-            let parent = scopes[i].parent;
+            let parent = scopes[i].parent.index();
             if coverage[i] != Coverage::Nothing && coverage[parent] == Coverage::Nothing {
                 coverage[parent] = Coverage::Path;
             }

@@ -1,11 +1,12 @@
 //! Yosys's generic cells as cells of the library: [`place`] is the one function that knows cell types.
 
+#[cfg(feature = "liberty")]
 mod library;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::{Bit, CellEntry, YosysError};
+use super::{Bit, CellEntry, CellFault, PinFault, YosysError};
 use crate::netlist::CellKind::{
     self, And2, Buf, Dffr, Dffsr, Inv, Mux2, Nand2, Nor2, Or2, Xnor2, Xor2,
 };
@@ -98,7 +99,7 @@ impl<'d> Placing<'d> {
                 module: self.module.to_owned(),
                 cell: name.to_owned(),
                 kind: entry.kind.clone(),
-                why: cure(&entry.kind),
+                why: cell_fault(&entry.kind),
             })
         }
     }
@@ -192,7 +193,7 @@ impl<'d> Placing<'d> {
             cell: given.name.to_owned(),
             kind: given.entry.kind.clone(),
             pin: pin.to_owned(),
-            problem: "must be constant, which takes an input of the module; give it one",
+            problem: PinFault::NoConstant,
         })
     }
 
@@ -200,10 +201,10 @@ impl<'d> Placing<'d> {
         let problem = match given.entry.connections.get(pin).map(Vec::as_slice) {
             Some([bit]) => match self.net(bit) {
                 Some(net) => return Ok(net),
-                None => "is connected to a net that nothing drives; drive it",
+                None => PinFault::Undriven,
             },
-            Some([]) | None => "is connected to nothing; connect it",
-            Some(_) => "has several bits; run synth -flatten",
+            Some([]) | None => PinFault::Open,
+            Some(_) => PinFault::Bus,
         };
         Err(YosysError::Pin {
             module: self.module.to_owned(),
@@ -226,6 +227,7 @@ impl<'d> Placing<'d> {
 /// Places the cells that do what a cell of this type does; false where there are none.
 fn place(to: &mut Placing<'_>, given: &YosysCell<'_>) -> Result<bool, YosysError> {
     let kind = given.entry.kind.as_str();
+    #[cfg(feature = "liberty")]
     if let Some(function) = &given.entry.of_library {
         library::place(to, given, function)?;
         return Ok(true);
@@ -267,22 +269,16 @@ fn place(to: &mut Placing<'_>, given: &YosysCell<'_>) -> Result<bool, YosysError
     Ok(true)
 }
 
-/// Why a cell has no counterpart, and what helps.
-fn cure(kind: &str) -> &'static str {
+/// Why a cell has no counterpart.
+fn cell_fault(kind: &str) -> CellFault {
     match kind {
         _ if kind.starts_with("$_DLATCH") || kind.starts_with("$_SR_") || kind == "$dlatch" => {
-            "a latch, which has no counterpart here; write it as a flip-flop"
+            CellFault::Latch
         }
-        _ if kind.starts_with("$mem") => {
-            "a memory, which is not mapped to gates; run synth -flatten; memory_map; techmap"
-        }
-        _ if kind.starts_with("$_") => {
-            "which has no counterpart here; run synth -flatten; abc -g simple"
-        }
-        _ if kind.starts_with('$') => "which is not mapped to gates; run synth -flatten; techmap",
-        _ => {
-            "which is no gate or flip-flop of the sensor's library; run synth -flatten, or give the library (liberty) whose cell it is"
-        }
+        _ if kind.starts_with("$mem") => CellFault::Memory,
+        _ if kind.starts_with("$_") => CellFault::Gate,
+        _ if kind.starts_with('$') => CellFault::NotMapped,
+        _ => CellFault::Unknown,
     }
 }
 

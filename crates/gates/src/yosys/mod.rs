@@ -23,11 +23,11 @@ use std::sync::Arc;
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
+#[cfg(feature = "liberty")]
 use crate::liberty::{CellFunction, Liberty};
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net, is_identifier};
 use cells::{FlipFlop, Placing};
-pub use error::YosysError;
-use error::in_words;
+pub use error::{CellFault, JsonFault, PinFault, YosysError};
 
 /// Most bytes of a file: a macropixel has 1.2 MB, a block a tenth of that.
 const MOST_BYTES: usize = 16 << 20;
@@ -97,6 +97,7 @@ struct PortBits {
 #[derive(Deserialize)]
 struct CellEntry {
     /// What it does, where it is a library's.
+    #[cfg(feature = "liberty")]
     #[serde(skip)]
     of_library: Option<CellFunction>,
     #[serde(rename = "type")]
@@ -127,31 +128,62 @@ impl Module {
     /// # Errors
     /// Text that is no such netlist, modules that there are not or among which none is the top, cells that have no counterpart
     /// here, nets that nothing or more than one cell drives, names that are no identifiers.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::netlist::Module;
+    ///
+    /// let text = r#"{"modules": {"top": {
+    ///   "ports": {
+    ///     "A": {"direction": "input", "bits": [2]},
+    ///     "Y": {"direction": "output", "bits": [3]}
+    ///   },
+    ///   "cells": {
+    ///     "$1": {"type": "$_NOT_", "connections": {"A": [2], "Y": [3]}}
+    ///   }
+    /// }}}"#;
+    /// let top = Module::from_yosys(text, None)?;
+    /// assert_eq!((top.name(), top.cells().len()), ("top", 1));
+    ///
+    /// let error = Module::from_yosys(text, Some("counter")).unwrap_err();
+    /// assert_eq!(error.to_string(), "has no module counter; give top");
+    /// # Ok::<(), femtogate::yosys::YosysError>(())
+    /// ```
     pub fn from_yosys(text: &str, top: Option<&str>) -> Result<Arc<Self>, YosysError> {
-        Self::from_yosys_of(text, top, None)
+        Design::from_json(text)?.build(top)
     }
 
     /// Reads a netlist of Yosys's generic gates and of a library's cells, which `abc` and `dfflibmap` put there.
     ///
     /// # Errors
     /// As [`Module::from_yosys`].
+    #[cfg(feature = "liberty")]
     pub fn from_yosys_of(
         text: &str,
         top: Option<&str>,
         library: Option<&Liberty>,
     ) -> Result<Arc<Self>, YosysError> {
-        if text.len() > MOST_BYTES {
-            return Err(YosysError::TooLong(text.len()));
-        }
-        let design: Design =
-            serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(in_words(&e)))?;
-        let mut modules = design.modules.0;
-        let cells = modules.iter_mut().flat_map(|(_, of)| &mut of.cells.0);
-        for (_, cell) in cells {
+        let mut design = Design::from_json(text)?;
+        let modules = design.modules.0.iter_mut();
+        for (_, cell) in modules.flat_map(|(_, of)| &mut of.cells.0) {
             cell.of_library = library
                 .and_then(|library| library.function(&cell.kind))
                 .cloned();
         }
+        design.build(top)
+    }
+}
+impl Design {
+    fn from_json(text: &str) -> Result<Self, YosysError> {
+        if text.len() > MOST_BYTES {
+            return Err(YosysError::TooLong(text.len()));
+        }
+        serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(JsonFault::new(&e)))
+    }
+    /// The module called `top`, or else the one that is marked as the top.
+    fn build(&self, top: Option<&str>) -> Result<Arc<Module>, YosysError> {
+        let modules = &self.modules.0;
         let is_top = |module: &YosysModule| {
             let top = module.attributes.get("top").map(ToString::to_string);
             top.is_some_and(|value| value.contains('1'))
@@ -166,7 +198,7 @@ impl Module {
                 })?
             }
             None => match (&modules[..], modules.iter().find(|(_, of)| is_top(of))) {
-                ([], _) => return Err(YosysError::NoNetlist("it has no module".into())),
+                ([], _) => return Err(YosysError::NoNetlist(JsonFault::NoModule)),
                 ([only], _) | (_, Some(only)) => only,
                 _ => return Err(YosysError::NoTop(names())),
             },
@@ -343,6 +375,7 @@ impl CellEntry {
     /// Pins that drive nets.
     fn outputs(&self) -> impl Iterator<Item = &(String, Vec<Bit>)> {
         self.connections.0.iter().filter(|(pin, _)| {
+            #[cfg(feature = "liberty")]
             if let Some(of) = &self.of_library {
                 // Yosys says no directions of cells that it has not read.
                 return of.outputs.contains(pin);

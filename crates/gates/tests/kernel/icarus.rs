@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use femtogate::netlist::{Netlist, Timing};
+use femtogate::netlist::{Netlist, ScopeId, Timing};
 use rand::{RngExt, rngs::StdRng};
 
 use crate::tool;
@@ -43,7 +43,7 @@ fn run(folder: &Path, program: &str, arguments: &[&str]) -> String {
 #[allow(dead_code)]
 pub fn random_delays(netlist: &Netlist, nominal: &Timing, random: &mut StdRng) -> Timing {
     let mut timing = nominal.clone();
-    for cell in 0..netlist.cells().len() {
+    for cell in netlist.cells_below(ScopeId::TOP) {
         let mut delays = *nominal.cell_delays(cell);
         for arc in delays.as_flattened_mut() {
             arc.rise_fs = (arc.rise_fs as f64 * random.random_range(0.7..1.4)) as u32;

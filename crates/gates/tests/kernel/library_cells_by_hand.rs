@@ -4,7 +4,9 @@
 use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
 use femtogate::liberty::{CharacterisedNetlist, Environment, Liberty};
 use femtogate::logic::Logic;
-use femtogate::netlist::{CellKind, CheckKind, Control, Edge, ModuleBuilder, Netlist};
+use femtogate::netlist::{
+    CellId, CellKind, CheckKind, Control, Edge, ModuleBuilder, Netlist, ScopeId,
+};
 use femtogate::units::Time;
 
 /// Input capacitance of INV_1, pF.
@@ -98,7 +100,7 @@ fn delays_of_a_gate_of_two_cells() {
     assert_eq!(numbers, [0b010, 0b111, 0b010].map(Some));
     let at = [1, 3, 5].map(|ns| seen.value_at(z, Time::from_ns(ns)));
     assert_eq!(at, [Logic::Zero, Logic::One, Logic::Zero]);
-    let (area, leakage_w) = made.silicon(&netlist, &library, 0);
+    let (area, leakage_w) = made.silicon(&netlist, &library, ScopeId::TOP);
     assert_near(area, 1.0 + 0.7);
     assert_near(leakage_w, (0.5 + 0.35) * 1e-9);
 }
@@ -115,7 +117,7 @@ fn limits_of_a_flip_flop() {
     let environment = Environment::new(&library);
     let slew = environment.input_slew_fs * 1e-6;
     let made = CharacterisedNetlist::new(&netlist, &library, &environment);
-    let limits = made.timing.limits(0, CellKind::Dffr);
+    let limits = made.timing.limits(CellId::new(0), CellKind::Dffr);
     let limit = |kind, edge| limits.limit_fs(Control::Reset, kind, edge);
     for (kind, [rise_fs, fall_fs]) in [
         (CheckKind::Setup, [25_000, 30_000]),
@@ -158,7 +160,7 @@ fn energies_of_two_inverters() {
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let environment = Environment::new(library);
         let made = CharacterisedNetlist::new(&netlist, library, &environment);
-        let [within, loads] = made.energy_j((&netlist, 0), library, 2.0, |_| 10.0);
+        let [within, loads] = made.energy_j((&netlist, ScopeId::TOP), library, 2.0, |_| 10.0);
         (within, loads, environment.input_slew_fs * 1e-6)
     };
     let (within, loads, slew) = energies(&library());
@@ -195,7 +197,7 @@ fn energy_of_a_gate_of_two_cells() {
     let (netlist, made, slew) = alone(&library, CellKind::And2);
     let a = netlist.net("A").unwrap();
     let z = netlist.net("Z").unwrap();
-    let [within, loads] = made.energy_j((&netlist, 0), &library, 1.0, |net| {
+    let [within, loads] = made.energy_j((&netlist, ScopeId::TOP), &library, 1.0, |net| {
         f64::from(u8::from(net == a || net == z))
     });
     let between = 0.006 + 7.5 * INVERTER_PF + 0.04 * slew;

@@ -7,7 +7,7 @@ use femtogate::liberty::{
     CharacterisedNetlist, Clocking, Environment, Liberty, write_constraints, write_mapped,
     write_mapped_cells, write_mapped_sdf,
 };
-use femtogate::netlist::{CellKind, ModuleBuilder, Netlist};
+use femtogate::netlist::{CellId, CellKind, ModuleBuilder, Netlist};
 use femtogate::units::Time;
 
 fn text() -> String {
@@ -146,7 +146,7 @@ fn capacitance_of_outputs_is_a_load() {
             wire_ff: 0.0,
         };
         let made = CharacterisedNetlist::new(&netlist, &library, &environment);
-        let arc = made.timing.cell_delays(0)[0][0];
+        let arc = made.timing.cell_delays(CellId::new(0))[0][0];
         [arc.rise_fs, arc.fall_fs].map(f64::from)
     };
     let before = delays(&text());

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use femtogate::kernel::Activity;
 use femtogate::logic::Logic;
-use femtogate::netlist::{DelayModel, NetId, Netlist, Timing};
+use femtogate::netlist::{CellId, DelayModel, NetId, Netlist, ScopeId, Timing};
 use femtogate::units::Time;
 use femtogate::waves::write_saif;
 use proptest::prelude::*;
@@ -72,7 +72,7 @@ fn bits(netlist: &Netlist, waves: &Waves) -> Vec<(String, NetId, Changes)> {
     let mut bits = Vec::new();
     let dumped: BTreeMap<&str, &[(u64, String)]> = waves.changes().collect();
     for (index, scope) in netlist.scopes().iter().enumerate() {
-        let scope_path = netlist.scope_path(index);
+        let scope_path = netlist.scope_path(ScopeId::new(index));
         let below_top = scope_path.split_once('.').map(|(_, below)| below);
         for signal in scope.module.signals() {
             let names = below_top.into_iter().chain([signal.name.as_str()]);
@@ -198,11 +198,12 @@ fn inertial_glitches(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> 
                 let causes = (0..pins.len()).filter(|&pin| {
                     cell.kind.triggers(pin) && !is_fall(pin) && now[pin] != value(pin, time - 1)
                 });
-                let delays = causes
-                    .map(|pin| i64::from(timing.cell_delays(index)[pin][which].delay_fs(next)));
+                let delays = causes.map(|pin| {
+                    i64::from(timing.cell_delays(CellId::new(index))[pin][which].delay_fs(next))
+                });
                 let due = time + delays.min().unwrap();
                 on_their_way.retain(|&(arrives, _)| arrives > time);
-                let stays = match timing.model(index) {
+                let stays = match timing.model(CellId::new(index)) {
                     DelayModel::Inertial => 0,
                     DelayModel::Transport => on_their_way.partition_point(|&(t, _)| t < due),
                 };

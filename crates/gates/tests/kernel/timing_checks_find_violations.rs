@@ -141,7 +141,7 @@ fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str
         let case = format!("{} {check:?} {corner:?} {varied:?}", kind.name());
         let of_kind = report.violations.iter().filter(|v| v.kind == check);
         let found: Vec<_> = of_kind.filter(|v| v.cell == "pair.first").collect();
-        let slacks: Vec<_> = found.iter().map(|v| v.slack_fs).collect();
+        let slacks: Vec<_> = found.iter().map(|v| v.slack.as_fs()).collect();
         assert_eq!(
             slacks,
             if slack < 0 { vec![slack] } else { vec![] },
@@ -154,7 +154,7 @@ fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str
         assert_eq!(others.count(), 0, "{case} {slack}: {report}");
         if slack < 0 {
             let worst = report.summary(check).worst.clone().unwrap();
-            assert_eq!(worst.slack_fs, slack, "{case}");
+            assert_eq!(worst.slack.as_fs(), slack, "{case}");
         }
     }
 }
@@ -182,7 +182,7 @@ fn each_control_is_judged_by_its_own_limit() {
             .unwrap();
         let report = checks.report(&netlist);
         let first = report.violations.iter().filter(|v| v.cell == "pair.first");
-        let slacks: Vec<_> = first.map(|v| v.slack_fs).collect();
+        let slacks: Vec<_> = first.map(|v| v.slack.as_fs()).collect();
         assert_eq!(slacks, [4_000 - limit], "{control}");
         let said = report.to_string();
         assert!(said.contains(&format!(".{control} at ")), "{said}");
@@ -212,7 +212,7 @@ fn kinds(steps: &[(i64, &'static str, Logic)]) -> Vec<(CheckKind, i64)> {
     let policy = Policy::ReportOnly;
     let (report, ..) = simulate(&pair(kind), &library, Corner::Typ, policy, &steps);
     let of_first = report.violations.iter().filter(|v| v.cell == "pair.first");
-    of_first.map(|v| (v.kind, v.slack_fs)).collect()
+    of_first.map(|v| (v.kind, v.slack.as_fs())).collect()
 }
 
 /// The limit for a rising D.
@@ -340,6 +340,7 @@ fn a_violation_makes_the_state_unknown_downstream_until_a_reset() {
 }
 
 /// A report survives JSON.
+#[cfg(feature = "serde")]
 #[test]
 fn a_report_round_trips_through_json() {
     let steps = script(CellKind::Dffr, CheckKind::Hold, ("R", Edge::Rise), 4);

@@ -11,7 +11,7 @@ use femtogate::kernel::{CheckReport, Kernel, Policy, Recorder, Stimulus, TimingC
 use femtogate::logic::Logic;
 use femtogate::netlist::{
     CellKind, CheckKind, CheckLimits, Corner, DataLimit, Delay, Edge, Library, NetId, Netlist,
-    TimingArc,
+    ScopeId, TimingArc,
 };
 use femtogate::units::Time;
 use proptest::prelude::*;
@@ -148,14 +148,14 @@ fn check_violations(
     trace: &Recorder,
     limits: &CheckLimits,
 ) -> Result<(), TestCaseError> {
-    let cells = netlist.cells().iter().enumerate();
-    for (index, cell) in cells.filter(|(_, cell)| cell.kind.is_flip_flop()) {
-        let path = netlist.cell_path(index);
+    let cells = netlist.cells_below(ScopeId::TOP).zip(netlist.cells());
+    for (id, cell) in cells.filter(|(_, cell)| cell.kind.is_flip_flop()) {
+        let path = netlist.cell_path(id);
         let mut found: Vec<_> = report
             .violations
             .iter()
             .filter(|v| v.cell == path)
-            .map(|v| (v.kind, v.pin.clone(), v.time_fs, v.slack_fs))
+            .map(|v| (v.kind, v.pin.clone(), v.time.as_fs(), v.slack.as_fs()))
             .collect();
         found.sort();
         prop_assert_eq!(

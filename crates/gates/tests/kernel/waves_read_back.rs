@@ -14,7 +14,8 @@ use std::sync::{Arc, Once};
 use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
 use femtogate::logic::Logic;
 use femtogate::netlist::{
-    CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist, Timing, TimingArc,
+    CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist, ScopeId, Timing,
+    TimingArc,
 };
 use femtogate::units::Time;
 use femtogate::waves::{FstWriter, VcdWriter, WaveSelection};
@@ -233,7 +234,11 @@ fn signals(netlist: &Netlist) -> Vec<(Vec<String>, bool, Vec<NetId>)> {
     let mut signals = Vec::new();
     for (index, scope) in netlist.scopes().iter().enumerate() {
         for signal in scope.module.signals() {
-            let path = format!("{}.{}", netlist.scope_path(index), signal.name);
+            let path = format!(
+                "{}.{}",
+                netlist.scope_path(ScopeId::new(index)),
+                signal.name
+            );
             let path = path.split('.').map(str::to_owned).collect();
             let nets = netlist.signal_nets(scope, signal).collect();
             signals.push((path, signal.is_bus, nets));

@@ -57,7 +57,8 @@ impl LoadTiming {
         let loads = LoadProbe::MemoryLoad.bus(&netlist);
         let tokens = requirements(&loads);
         let gated = requirements(&[step]);
-        let is_memory = |r: &&Requirement| loads.contains(&netlist.cells()[r.cell].input(1));
+        let is_memory =
+            |r: &&Requirement| loads.contains(&netlist.cells()[r.cell.index()].input(1));
         let memories = gated.all().iter().filter(is_memory);
         let others = tokens.all().iter().filter(|r| !is_memory(r));
         let latest = |nets: &[NetId]| {

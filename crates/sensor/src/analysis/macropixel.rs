@@ -13,7 +13,7 @@ use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, Macropix
 use crate::chip::timing::measure::ResetPulse;
 use crate::chip::{Conflict, Limits, Mode, Probe, Probes, Race, SensorConfig, Silicon};
 use crate::netlist::{
-    Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements,
+    Bound, CellId, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements,
 };
 use crate::units::Time;
 
@@ -136,7 +136,7 @@ impl MacropixelTiming {
             block: counter.block.zip(counter.block_to_counter_clk),
             counter_clk_high: circuit
                 .clocked_by_counter_clk()
-                .map(|cell| library.checks(netlist.cells()[cell].kind))
+                .map(|cell| library.checks(netlist.cells()[cell.index()].kind))
                 .map(|checks| Time::from_fs(checks.limit_fs(CheckKind::ClockHigh, corner).into()))
                 .max()
                 .expect("a P-counter counts"),
@@ -180,7 +180,7 @@ impl MacropixelTiming {
 
     /// Shortest CLK period of the path CLK → SPAD_EVENT → shift register.
     pub fn correlation_period(&self) -> Option<Time> {
-        let stages: Vec<usize> = self.probes.event_stages(&self.netlist).collect();
+        let stages: Vec<CellId> = self.probes.event_stages(&self.netlist).collect();
         let first = |r: &&Requirement| stages.contains(&r.cell);
         let setups = self.clk.iter().filter(|r| r.kind == CheckKind::Setup);
         longest(setups.filter(first))

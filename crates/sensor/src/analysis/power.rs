@@ -17,7 +17,7 @@
 use crate::chip::{CellLibrary, Exposure, SensorConfig};
 use crate::engine::GateSimulation;
 use crate::kernel::{Activity, NetActivity};
-use crate::netlist::{CellKind, NetId, Netlist};
+use crate::netlist::{CellId, CellKind, NetId, Netlist, ScopeId};
 use crate::photon::SpadEvent;
 
 /// What is charged, and to what voltage.
@@ -70,8 +70,8 @@ const fn inner_pairs(kind: CellKind) -> u32 {
 
 impl Capacitances {
     /// Energy of what a cell's pins and inner nodes did, J.
-    fn cell_j(&self, netlist: &Netlist, cell: usize, nets: &[NetActivity]) -> f64 {
-        let cell = &netlist.cells()[cell];
+    fn cell_j(&self, netlist: &Netlist, cell: CellId, nets: &[NetActivity]) -> f64 {
+        let cell = &netlist.cells()[cell.index()];
         let toggles = |net: NetId| nets[net.index()].toggles as f64;
         let pins = cell.input_nets().enumerate();
         let of_pin = |(pin, net): (usize, _)| {
@@ -86,25 +86,24 @@ impl Capacitances {
         0.5 * self.supply_v * self.supply_v * (inputs + inner + drains)
     }
 
-    /// Energy of scope `index` of the netlist and all below it, J.
-    pub(crate) fn scope_j(&self, netlist: &Netlist, index: usize, nets: &[NetActivity]) -> f64 {
-        let scopes = index..index + netlist.scopes()[index].subtree;
-        let cells = scopes.flat_map(|scope| netlist.cells_of(scope));
+    /// Energy of a scope of the netlist and all below it, J.
+    pub(crate) fn scope_j(&self, netlist: &Netlist, scope: ScopeId, nets: &[NetActivity]) -> f64 {
+        let cells = netlist.cells_below(scope);
         cells.map(|cell| self.cell_j(netlist, cell, nets)).sum()
     }
 
-    /// Energy of each block directly below scope `index`, J, by its name.
+    /// Energy of each block directly below a scope, J, by its name.
     pub(crate) fn blocks_j(
         &self,
         netlist: &Netlist,
-        index: usize,
+        scope: ScopeId,
         nets: &[NetActivity],
     ) -> Vec<(String, f64)> {
-        let block = |scope: usize| {
-            let name = netlist.scopes()[scope].name.clone();
+        let block = |scope: ScopeId| {
+            let name = netlist.scopes()[scope.index()].name.clone();
             (name, self.scope_j(netlist, scope, nets))
         };
-        netlist.children(index).map(block).collect()
+        netlist.children(scope).map(block).collect()
     }
 }
 
@@ -159,9 +158,8 @@ impl MacropixelPower {
         let scope = scope.expect("the simulation has a macropixel");
         let cycles = f64::from(exposure.laser_cycles);
         let blocks = capacitances.blocks_j(&netlist, scope, &nets).into_iter();
-        let scopes = scope..scope + netlist.scopes()[scope].subtree;
-        let outputs = scopes.flat_map(|scope| netlist.cells_of(scope));
-        let outputs = outputs.flat_map(|cell| netlist.cells()[cell].output_nets());
+        let cells = netlist.cells_below(scope);
+        let outputs = cells.flat_map(|cell| netlist.cells()[cell.index()].output_nets());
         let toggles: u64 = outputs.map(|net| nets[net.index()].toggles).sum();
         let library = CellLibrary::from_config(config)
             .ok()
@@ -169,7 +167,7 @@ impl MacropixelPower {
         let silicon = library.map(|library| {
             let characterised = library.characterised(&netlist);
             let volt = library.liberty.conditions[0].unwrap_or(capacitances.supply_v);
-            let block_silicon = |block: usize| {
+            let block_silicon = |block: ScopeId| {
                 let (area, leakage_w) = characterised.silicon(&netlist, &library.liberty, block);
                 let changes = |net: NetId| nets[net.index()].toggles as f64 / cycles;
                 let energy =
@@ -178,7 +176,7 @@ impl MacropixelPower {
                     block: if block == scope {
                         "macropixel".to_owned()
                     } else {
-                        netlist.scopes()[block].name.clone()
+                        netlist.scopes()[block.index()].name.clone()
                     },
                     area,
                     leakage_w,
@@ -265,7 +263,7 @@ mod tests {
         let inverter = 10.0 * (3.0 + 5.0) + 10.0 * 7.0;
         let flip_flop = 10.0 * (6.0 * 3.0 + 5.0) + 7.0 + 4.0 * 3.0;
         let wanted = 0.5 * 4.0 * (inverter + flip_flop) * 1e-15;
-        let found = c.scope_j(&netlist, 0, &nets);
+        let found = c.scope_j(&netlist, ScopeId::TOP, &nets);
         assert!((found / wanted - 1.0).abs() < 1e-12, "{found} {wanted}");
     }
 }

@@ -17,7 +17,7 @@ use crate::chip::{
     metdc_delay_line,
 };
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, Stimulus, TimingChecks};
-use crate::netlist::{NetId, Netlist, Timing};
+use crate::netlist::{CellId, NetId, Netlist, Timing};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::stimulus::{
     HardwareEvents, Schedule, Skip, StimulusPlan, read_stimulus, reload_stimulus,
@@ -34,7 +34,7 @@ pub struct GateSimulation {
     kernel: Kernel,
     plan: StimulusPlan,
     /// When counts are set that would have come of laser cycles that are left out, and the flip-flops of those counts.
-    preset: Option<(Time, Vec<(usize, bool)>)>,
+    preset: Option<(Time, Vec<(CellId, bool)>)>,
 }
 
 impl GateSimulation {

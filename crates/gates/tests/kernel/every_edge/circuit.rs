@@ -12,8 +12,8 @@ use super::placement::{Item, MOST_INPUTS, Recipe, placed};
 use femtogate::kernel::Drive;
 use femtogate::logic::Logic;
 use femtogate::netlist::{
-    CellArcs, CellKind, Corner, Delay, DelayModel, Library, MAX_INPUTS, Module, Netlist, Timing,
-    TimingArc,
+    CellArcs, CellKind, Corner, Delay, DelayModel, Library, MAX_INPUTS, Module, Netlist, ScopeId,
+    Timing, TimingArc,
 };
 use femtogate::units::Time;
 use proptest::prelude::*;
@@ -141,7 +141,7 @@ impl Case {
     /// Delays of the library, some cells' as transport delays: the same ones however the cells are ordered.
     pub fn timing(&self, netlist: &Netlist) -> Timing {
         let mut timing = Timing::nominal(netlist, &self.cell_library(), self.corner);
-        for cell in 0..netlist.cells().len() {
+        for cell in netlist.cells_below(ScopeId::TOP) {
             let mut hash = std::hash::DefaultHasher::new();
             (self.delay_seed, netlist.cell_path(cell)).hash(&mut hash);
             if hash.finish() % 4 < u64::from(self.transport) {

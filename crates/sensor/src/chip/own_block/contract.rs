@@ -13,7 +13,8 @@ use crate::chip::probes::{Probe, Probes, reached};
 use crate::chip::timing::silicon::Silicon;
 use crate::chip::{correlation, front_end, histogram, metdc};
 use crate::netlist::{
-    Arrivals, Corner, Direction, Edge, FlatCell, Module, NetId, Netlist, StaticTiming,
+    Arrivals, CellId, Corner, Direction, Edge, FlatCell, Module, NetId, Netlist, ScopeId,
+    StaticTiming,
 };
 
 /// What a block's netlist must be.
@@ -194,7 +195,7 @@ impl Contract {
         if let Err(found) = paths.arrivals(&starts, &[]) {
             return Err(format!(
                 "{file}: module {name} has a loop of gates at {}, where time cannot be added up; break it with a flip-flop",
-                found.net
+                found.path
             ));
         }
         let (netlist, probes) = (&netlist, Probes::of_block(&netlist));
@@ -243,10 +244,12 @@ fn front_end(found: &CheckedBlock<'_>) -> Option<String> {
     let CheckedBlock {
         netlist, probes, ..
     } = found;
-    let samplers: Vec<usize> = probes.samplers(netlist).collect();
+    let samplers: Vec<CellId> = probes.samplers(netlist).collect();
     let is_sampled = |raw: &NetId| {
-        let reached = reached(netlist, 0..netlist.cells().len(), &[*raw]);
-        let mut data = samplers.iter().map(|&cell| netlist.cells()[cell].input(0));
+        let reached = reached(netlist, netlist.cells_below(ScopeId::TOP), &[*raw]);
+        let mut data = samplers
+            .iter()
+            .map(|&cell| netlist.cells()[cell.index()].input(0));
         data.any(|net| reached.contains(&net))
     };
     if let Some(spad) = probes
@@ -283,7 +286,7 @@ fn metdc(found: &CheckedBlock<'_>) -> Option<String> {
     let cells = probes.find_hit_cells(netlist).unwrap_or_default();
     let mut cells = cells
         .into_iter()
-        .map(|cell| &netlist.cells()[cell])
+        .map(|cell| &netlist.cells()[cell.index()])
         .peekable();
     let Some(first) = cells.peek().copied() else {
         return Some("has a HIT that no flip-flop drives, whose glitches would be counted; make each bit of it one flip-flop's output".to_owned());
@@ -315,7 +318,7 @@ fn histogram(found: &CheckedBlock<'_>) -> Option<String> {
     let netlist = found.netlist;
     let reached = reached(
         netlist,
-        0..netlist.cells().len(),
+        netlist.cells_below(ScopeId::TOP),
         found.probes.bus(Probe::Hit),
     );
     let outputs = netlist.scopes()[0].module.port_signals();

@@ -32,7 +32,7 @@ use crate::chip::timing::silicon::Silicon;
 use crate::chip::{Probe, Probes};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Corner, FlatCell, MAX_INPUTS, Module, NetId, Netlist};
+use crate::netlist::{CellId, CellKind, Corner, FlatCell, MAX_INPUTS, Module, NetId, Netlist};
 use crate::units::Time;
 
 /// Pins of a flip-flop.
@@ -215,7 +215,7 @@ impl<'n> Counter<'n> {
     fn name(&self, cell: usize) -> String {
         let leaf = &self.netlist.cells()[cell];
         let kind = leaf.kind;
-        let path = self.netlist.cell_path(cell);
+        let path = self.netlist.cell_path(CellId::new(cell));
         let (_, cell) = path.split_once('.').expect("a cell is below the top");
         let mut nets = leaf.output_nets();
         match (nets.find_map(|net| self.named(net)), kind.is_flip_flop()) {

@@ -29,10 +29,9 @@ pub use pins::{LoadPins, ReadPins, SensorPins};
 pub use readout::ReadProbe;
 
 use std::collections::HashSet;
-use std::ops::Range;
 
 use super::{array, histogram};
-use crate::netlist::{CellKind, FlatCell, NetId, Netlist};
+use crate::netlist::{CellId, CellKind, FlatCell, NetId, Netlist, ScopeId};
 
 /// A net or bus of a macropixel that something outside the circuits looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -333,7 +332,7 @@ impl Probes {
     ///
     /// # Panics
     /// When the circuit does not have it.
-    pub(crate) fn bin_cells(&self, netlist: &Netlist, bin: usize) -> Vec<usize> {
+    pub(crate) fn bin_cells(&self, netlist: &Netlist, bin: usize) -> Vec<CellId> {
         let cell = |bit| {
             join([
                 &self.path,
@@ -346,7 +345,7 @@ impl Probes {
     }
 
     /// The toggle flip-flop of each SPAD.
-    pub(crate) fn toggle_cells(&self, netlist: &Netlist) -> Vec<usize> {
+    pub(crate) fn toggle_cells(&self, netlist: &Netlist) -> Vec<CellId> {
         let cell = |spad| spad_path(&self.path, spad) + ".toggle";
         cells(netlist, (0..self.toggles.len()).map(cell))
     }
@@ -356,7 +355,7 @@ impl Probes {
     pub(crate) fn samplers<'n>(
         &self,
         netlist: &'n Netlist,
-    ) -> impl Iterator<Item = usize> + use<'n> {
+    ) -> impl Iterator<Item = CellId> + use<'n> {
         self.clocked_behind(netlist, FRONT_END, Probe::SpadRaw)
     }
 
@@ -364,7 +363,7 @@ impl Probes {
     pub(crate) fn event_stages<'n>(
         &self,
         netlist: &'n Netlist,
-    ) -> impl Iterator<Item = usize> + use<'n> {
+    ) -> impl Iterator<Item = CellId> + use<'n> {
         self.clocked_behind(netlist, METDC, Probe::SpadEvent)
     }
 
@@ -372,7 +371,7 @@ impl Probes {
     pub(crate) fn start_samplers<'n>(
         &self,
         netlist: &'n Netlist,
-    ) -> impl Iterator<Item = usize> + use<'n> {
+    ) -> impl Iterator<Item = CellId> + use<'n> {
         self.clocked_behind(netlist, METDC, Probe::Start)
     }
 
@@ -382,21 +381,25 @@ impl Probes {
         netlist: &'n Netlist,
         block: &str,
         from: Probe,
-    ) -> impl Iterator<Item = usize> + use<'n> {
+    ) -> impl Iterator<Item = CellId> + use<'n> {
         let cells = self.block_cells(netlist, block);
         let from = self.find(from).unwrap_or_default();
         let reached = reached(netlist, cells.clone(), from);
         let clk = self.net(Probe::Clk);
         cells.filter(move |&cell| {
-            let cell = &netlist.cells()[cell];
+            let cell = &netlist.cells()[cell.index()];
             cell.kind.is_flip_flop() && cell.input(1) == clk && reached.contains(&cell.input(0))
         })
     }
 
     /// The cells of a block of the macropixel, or all of those of a block alone.
-    fn block_cells(&self, netlist: &Netlist, block: &str) -> Range<usize> {
+    fn block_cells(
+        &self,
+        netlist: &Netlist,
+        block: &str,
+    ) -> impl Iterator<Item = CellId> + Clone + use<> {
         let scope = netlist.scope(&join([&self.path, block]));
-        scope.map_or(0..netlist.cells().len(), |scope| netlist.cells_below(scope))
+        netlist.cells_below(scope.unwrap_or(ScopeId::TOP))
     }
 
     /// The end of each pulse shaper's delay chain, by SPAD.
@@ -409,7 +412,7 @@ impl Probes {
     }
 
     /// The stages of the METDC's shift register, the first one first.
-    pub(crate) fn shift_cells(&self, netlist: &Netlist) -> Vec<usize> {
+    pub(crate) fn shift_cells(&self, netlist: &Netlist) -> Vec<CellId> {
         let cell = |stage| join([&self.path, METDC, &format!("shift_{stage}")]);
         cells(netlist, (0..self.bus(Probe::Shift).len()).map(cell))
     }
@@ -418,13 +421,13 @@ impl Probes {
     ///
     /// # Panics
     /// When something else drives a HIT.
-    pub fn hit_cells(&self, netlist: &Netlist) -> Vec<usize> {
+    pub fn hit_cells(&self, netlist: &Netlist) -> Vec<CellId> {
         let cells = self.find_hit_cells(netlist);
         cells.expect("a METDC of one's own has been checked")
     }
 
     /// The HIT flip-flop of each bin, if each is one's output.
-    pub(crate) fn find_hit_cells(&self, netlist: &Netlist) -> Option<Vec<usize>> {
+    pub(crate) fn find_hit_cells(&self, netlist: &Netlist) -> Option<Vec<CellId>> {
         let cells = self.block_cells(netlist, METDC);
         let drives = |cell: &FlatCell, hit: NetId| {
             cell.kind.is_flip_flop() && cell.outputs.contains(&Some(hit))
@@ -432,7 +435,7 @@ impl Probes {
         let of_hit = |&hit| {
             cells
                 .clone()
-                .find(|&cell| drives(&netlist.cells()[cell], hit))
+                .find(|&cell| drives(&netlist.cells()[cell.index()], hit))
         };
         self.latched().iter().map(of_hit).collect()
     }
@@ -441,7 +444,10 @@ impl Probes {
     ///
     /// # Panics
     /// When the circuit has none.
-    pub fn timing_block_cells(&self, netlist: &Netlist) -> std::ops::Range<usize> {
+    pub fn timing_block_cells(
+        &self,
+        netlist: &Netlist,
+    ) -> impl Iterator<Item = CellId> + Clone + use<> {
         cells_of(netlist, &join([&self.path, P_COUNTER_TIMING]))
     }
 
@@ -449,16 +455,16 @@ impl Probes {
     ///
     /// # Panics
     /// When the circuit has no P-counter.
-    pub(crate) fn counter_cells(&self, netlist: &Netlist) -> Vec<usize> {
+    pub(crate) fn counter_cells(&self, netlist: &Netlist) -> Vec<CellId> {
         let cells = cells_of(netlist, &self.p_counter());
-        let is_flip_flop = |&cell: &usize| netlist.cells()[cell].kind.is_flip_flop();
+        let is_flip_flop = |&cell: &CellId| netlist.cells()[cell.index()].kind.is_flip_flop();
         cells.filter(is_flip_flop).collect()
     }
 
     /// The P-counter's flip-flops in the netlist of a macropixel alone, in the order in which they are described.
-    pub fn p_counter_cells(macropixel: &Netlist) -> Vec<usize> {
+    pub fn p_counter_cells(macropixel: &Netlist) -> Vec<CellId> {
         let cells = cells_of(macropixel, P_COUNTER);
-        let is_flip_flop = |&cell: &usize| macropixel.cells()[cell].kind.is_flip_flop();
+        let is_flip_flop = |&cell: &CellId| macropixel.cells()[cell.index()].kind.is_flip_flop();
         cells.filter(is_flip_flop).collect()
     }
 
@@ -475,7 +481,7 @@ impl Probes {
         let enable = self.net(Probe::Enable);
         let mut cells = self
             .timing_block_cells(netlist)
-            .map(|c| &netlist.cells()[c]);
+            .map(|cell| &netlist.cells()[cell.index()]);
         let inverter = cells.find(|cell| cell.kind == CellKind::Inv && cell.input(0) == enable);
         let inverter = inverter.expect("ENABLE has an inverter");
         inverter.outputs[0].expect("its output is read")
@@ -489,7 +495,7 @@ impl Probes {
         let (reset, pulse) = (self.net(Probe::CounterReset), self.net(Probe::ResetPulse));
         let mut drivers = self
             .timing_block_cells(netlist)
-            .map(|c| &netlist.cells()[c]);
+            .map(|cell| &netlist.cells()[cell.index()]);
         let or = drivers.find(|cell| cell.outputs[0] == Some(reset));
         let or = or.expect("COUNTER_RESET has a driver");
         if or.input(0) == pulse {
@@ -501,11 +507,15 @@ impl Probes {
 }
 
 /// Nets that edges of these come to within some cells, through gates, clocks, resets and sets.
-pub(crate) fn reached(netlist: &Netlist, cells: Range<usize>, from: &[NetId]) -> HashSet<NetId> {
+pub(crate) fn reached(
+    netlist: &Netlist,
+    cells: impl Iterator<Item = CellId> + Clone,
+    from: &[NetId],
+) -> HashSet<NetId> {
     let mut reached: HashSet<NetId> = from.iter().copied().collect();
     loop {
         let before = reached.len();
-        for cell in &netlist.cells()[cells.clone()] {
+        for cell in cells.clone().map(|cell| &netlist.cells()[cell.index()]) {
             let mut pins = (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin));
             if pins.any(|pin| reached.contains(&cell.input(pin))) {
                 reached.extend(cell.output_nets());
@@ -517,7 +527,7 @@ pub(crate) fn reached(netlist: &Netlist, cells: Range<usize>, from: &[NetId]) ->
     }
 }
 
-fn cells(netlist: &Netlist, paths: impl Iterator<Item = String>) -> Vec<usize> {
+fn cells(netlist: &Netlist, paths: impl Iterator<Item = String>) -> Vec<CellId> {
     let cell = |path: String| {
         let cell = netlist.cell(&path);
         cell.unwrap_or_else(|| panic!("the circuit has no {path}"))
@@ -525,7 +535,7 @@ fn cells(netlist: &Netlist, paths: impl Iterator<Item = String>) -> Vec<usize> {
     paths.map(cell).collect()
 }
 
-fn cells_of(netlist: &Netlist, path: &str) -> std::ops::Range<usize> {
+fn cells_of(netlist: &Netlist, path: &str) -> impl Iterator<Item = CellId> + Clone + use<> {
     let scope = netlist.scope(path);
     netlist.cells_of(scope.unwrap_or_else(|| panic!("the circuit has no {path}")))
 }

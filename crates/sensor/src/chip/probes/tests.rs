@@ -65,8 +65,8 @@ fn cells_drive_the_nets_that_they_are_named_after() {
     let config = config(PCounter::Ripple);
     let netlist = Netlist::elaborate(&array::circuit(&config));
     let probes = Probes::of_macropixel(&netlist, 0, 1);
-    let outputs = |cells: Vec<usize>| -> Vec<NetId> {
-        let output = |cell: usize| netlist.cells()[cell].outputs[0].unwrap();
+    let outputs = |cells: Vec<CellId>| -> Vec<NetId> {
+        let output = |cell: CellId| netlist.cells()[cell.index()].outputs[0].unwrap();
         cells.into_iter().map(output).collect()
     };
     assert_eq!(outputs(probes.toggle_cells(&netlist)), probes.toggles());
@@ -76,7 +76,7 @@ fn cells_drive_the_nets_that_they_are_named_after() {
     );
     assert_eq!(outputs(probes.hit_cells(&netlist)), probes.bus(Probe::Hit));
     // One of each SPAD, of the retiming below the front end; and the first of the shift register.
-    let paths = |cells: Vec<usize>| -> Vec<String> {
+    let paths = |cells: Vec<CellId>| -> Vec<String> {
         let path = |cell| netlist.cell_path(cell);
         cells.into_iter().map(path).collect()
     };

@@ -19,7 +19,7 @@ use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::files::instead_of;
 use crate::liberty::{CharacterisedNetlist, Environment, Liberty};
-use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
+use crate::netlist::{CellKind, Corner, Library, Module, Netlist, ScopeId, Timing};
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.
 #[derive(Debug, Clone, Copy)]
@@ -172,7 +172,8 @@ impl FromFile {
                 .entry(Arc::as_ptr(&scope.module))
                 .or_insert_with(|| scope.module.cell(front_end::TOGGLE));
             let Some(toggle) = *toggle else { continue };
-            let cell = netlist.cells_of(index).start + toggle;
+            let mut cells = netlist.cells_of(ScopeId::new(index));
+            let cell = cells.nth(toggle).expect("a cell of the module");
             let mut delays = *timing.cell_delays(cell);
             for arc in delays.as_flattened_mut() {
                 let slower = arc.rise_fs.max(arc.fall_fs);

@@ -24,7 +24,8 @@ use super::silicon::Silicon;
 use crate::chip::{LoadProbe, Probe, Probes, SensorConfig, Tdc, array};
 use crate::logic::Logic::{One, Zero};
 use crate::netlist::{
-    Arrivals, CellKind, Corner, Edge, FlatCell, NetId, Netlist, Requirement, StaticTiming, Timing,
+    Arrivals, CellId, CellKind, Corner, Edge, FlatCell, NetId, Netlist, Requirement, ScopeId,
+    StaticTiming, Timing,
 };
 use crate::units::Time;
 pub use counter::CounterDelays;
@@ -48,18 +49,18 @@ pub struct MacropixelCircuit {
     pub netlist: Netlist,
     /// Handles of its nets.
     pub probes: Probes,
-    toggles: Vec<usize>,
+    toggles: Vec<CellId>,
     /// What CLK samples of SPADs where a toggle flip-flop of each does not say it: on a wire that they share, in a front end of one's own.
     sampled: Vec<NetId>,
     /// Whether SPADs share a wire.
     joins: bool,
     /// Ends of the pulse shapers' delay chains.
     late: Vec<NetId>,
-    hits: Vec<usize>,
+    hits: Vec<CellId>,
     /// Data of which a CLK edge takes what the last one made: SPAD_EVENT, and all that CLK samples where blocks are one's own.
     clocked: Vec<NetId>,
     /// The P-counter's flip-flops, memory excepted.
-    counting: Vec<usize>,
+    counting: Vec<CellId>,
     /// COUNTER_RESET's cause besides STOP.
     clear: NetId,
     /// The inverse of ENABLE.
@@ -99,7 +100,7 @@ impl MacropixelCircuit {
             sampled: if config.front_end.joins() || config.front_end_block.is_some() {
                 probes
                     .samplers(&netlist)
-                    .map(|cell| netlist.cells()[cell].input(0))
+                    .map(|cell| netlist.cells()[cell.index()].input(0))
                     .collect()
             } else {
                 Vec::new()
@@ -126,11 +127,11 @@ impl MacropixelCircuit {
             }
         };
         let paths = self.cell_paths.get_or_init(|| {
-            let cells = 0..self.netlist.cells().len();
+            let cells = self.netlist.cells_below(ScopeId::TOP);
             cells.map(split).collect()
         });
         let name = array::pixel_name(position.0, position.1);
-        let path = |cell: usize| match &paths[cell] {
+        let path = |cell: CellId| match &paths[cell.index()] {
             (path, None) => path.clone(),
             (before, Some(after)) => [before, name.as_str(), after].concat(),
         };
@@ -158,7 +159,7 @@ impl MacropixelCircuit {
 
     /// The P-counter's flip-flops whose clock is COUNTER_CLK itself, or what a divider leaves of it: of a ripple counter the
     /// first one, and of the divider.
-    pub(crate) fn clocked_by_counter_clk(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn clocked_by_counter_clk(&self) -> impl Iterator<Item = CellId> + '_ {
         let counter_clk = self.probes.net(Probe::CounterClk);
         let divided = self.probes.find(Probe::StepClk).map(|nets| nets[0]);
         let all = self.counting.iter().copied();
@@ -178,7 +179,7 @@ impl MacropixelCircuit {
     ) -> (Vec<Requirement>, Vec<Requirement>) {
         let of_start = self.probes.start_samplers(&self.netlist);
         let samplers = self.probes.samplers(&self.netlist);
-        let samplers: Vec<usize> = samplers.chain(of_start.filter(|_| !with_start)).collect();
+        let samplers: Vec<CellId> = samplers.chain(of_start.filter(|_| !with_start)).collect();
         let asked = asked
             .iter()
             .filter(|r| !(r.kind.concerns_data() && samplers.contains(&r.cell)));
@@ -188,7 +189,7 @@ impl MacropixelCircuit {
     /// Kinds of the P-counter's flip-flops, memory excepted.
     pub(crate) fn counting_kinds(&self) -> impl Iterator<Item = CellKind> + '_ {
         let counting = self.counting.iter();
-        counting.map(|&cell| self.netlist.cells()[cell].kind)
+        counting.map(|&cell| self.netlist.cells()[cell.index()].kind)
     }
 
     /// The clock that freezes the window: of the delay lines' samples, or of the HIT flip-flops.
@@ -207,8 +208,8 @@ impl MacropixelCircuit {
         self.pin(self.hits[0], pin)
     }
 
-    fn pin(&self, cell: usize, pin: usize) -> NetId {
-        self.netlist.cells()[cell].input(pin)
+    fn pin(&self, cell: CellId, pin: usize) -> NetId {
+        self.netlist.cells()[cell.index()].input(pin)
     }
 }
 
@@ -363,7 +364,7 @@ impl<'c> MacropixelPaths<'c> {
     }
 
     /// Clock → an output rises, falls, of one flip-flop.
-    fn clock_to_q(&self, cell: usize, output: usize) -> (Time, Time) {
+    fn clock_to_q(&self, cell: CellId, output: usize) -> (Time, Time) {
         let clock = self.timing.cell_delays(cell)[1][output];
         let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.delay_fs(to).into()));
         (rise, fall)
@@ -426,7 +427,8 @@ impl<'c> MacropixelPaths<'c> {
 
     /// Fastest and slowest arc of every cell of some kinds.
     fn arcs(&self, is: impl Fn(CellKind) -> bool) -> impl Iterator<Item = Option<DelaySpan>> {
-        let cells = self.circuit.netlist.cells().iter().enumerate();
+        let netlist = &self.circuit.netlist;
+        let cells = netlist.cells_below(ScopeId::TOP).zip(netlist.cells());
         cells
             .filter(move |(_, leaf)| is(leaf.kind))
             .map(|(cell, leaf)| {
@@ -505,7 +507,7 @@ impl MacropixelDelays {
         let shift = hits.clone().filter(|_| circuit.is_clocked());
         let hits = hits.zip(circuit.probes.latched());
         let hits = hits.map(|(&cell, &hit)| {
-            let outputs = &circuit.netlist.cells()[cell].outputs;
+            let outputs = &circuit.netlist.cells()[cell.index()].outputs;
             paths
                 .clock_to_q(cell, usize::from(outputs[0] != Some(hit)))
                 .0

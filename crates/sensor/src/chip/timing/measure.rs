@@ -136,7 +136,7 @@ impl MeasuredDelays {
         // SPADs, SHIFT and HIT have flip-flops of this kind.
         let limit = |check| limit_of(CellKind::Dffr, check);
         let counting = circuit.clocked_by_counter_clk();
-        let counting = counting.map(|cell| circuit.netlist.cells()[cell].kind);
+        let counting = counting.map(|cell| circuit.netlist.cells()[cell.index()].kind);
         let counting: Vec<CellKind> = counting.collect();
         let of_counter = |check| {
             let limits = counting.iter().map(|&kind| limit_of(kind, check));

@@ -3,7 +3,7 @@
 use super::cell_library::CellLibrary;
 use crate::chip::SensorConfig;
 use crate::netlist::{
-    Conditions, Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as,
+    CellId, Conditions, Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as,
 };
 
 /// What the chip is made of.
@@ -85,8 +85,8 @@ impl Silicon {
         self.timing_as(netlist, |cell| netlist.cell_path(cell))
     }
 
-    /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
-    pub(crate) fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
+    /// Delays of another netlist that differs from this one in names only: there each cell is at this path.
+    pub(crate) fn timing_as(&self, netlist: &Netlist, path: impl Fn(CellId) -> String) -> Timing {
         self.timing_of(netlist, self.cell_timing(netlist), path)
     }
 
@@ -100,7 +100,7 @@ impl Silicon {
         &self,
         netlist: &Netlist,
         library: Timing,
-        path: impl Fn(usize) -> String,
+        path: impl Fn(CellId) -> String,
     ) -> Timing {
         let nominal = library.with_own_delays(netlist, self.corner, &path);
         varied_as(netlist, &nominal, self.factor, self.mismatch, path)

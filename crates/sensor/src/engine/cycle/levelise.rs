@@ -30,7 +30,7 @@ use super::tape::{Action, Code, PassTape, SINK, ZERO};
 use super::unlevelled::LevelisationError;
 use super::word::inversion;
 use crate::chip::{Exposure, SensorConfig, Silicon};
-use crate::netlist::{CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
+use crate::netlist::{CellId, CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
 use crate::units::Time;
 
 mod actions;
@@ -394,7 +394,7 @@ fn fastest_cell_fs(survey: &Survey) -> i64 {
     let delays = cells.flat_map(|(index, cell)| {
         let pins = (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin));
         pins.flat_map(move |pin| {
-            &survey.timing.cell_delays(index)[pin][..cell.kind.outputs().len()]
+            &survey.timing.cell_delays(CellId::new(index))[pin][..cell.kind.outputs().len()]
         })
     });
     delays

@@ -21,7 +21,7 @@ use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, array};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, FlatCell, MAX_INPUTS, NetId, Netlist, Timing};
+use crate::netlist::{CellId, CellKind, FlatCell, MAX_INPUTS, NetId, Netlist, Timing};
 use crate::units::Time;
 
 /// What a net depends on during an exposure.
@@ -119,7 +119,10 @@ impl Survey {
     pub(super) fn name(&self, net: NetId) -> String {
         self.netlist.net_path(net).unwrap_or_else(|| {
             let (cell, _) = self.driver[net.index()].expect("a net has a name or a driver");
-            format!("the output of {}", self.netlist.cell_path(cell))
+            format!(
+                "the output of {}",
+                self.netlist.cell_path(CellId::new(cell))
+            )
         })
     }
 

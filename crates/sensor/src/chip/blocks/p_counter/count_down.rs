@@ -12,7 +12,7 @@ use crate::chip::config::AfterBorrow;
 use crate::chip::own_block::Uneven;
 use crate::chip::{Probe, Probes, SensorConfig};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
-use crate::netlist::{NetId, Netlist, Timing};
+use crate::netlist::{CellId, NetId, Netlist, ScopeId, Timing};
 use crate::units::Time;
 
 /// Half a period of COUNTER_CLK, and every pause, at the least: long enough for ten thousand of the built-in gates one after the other.
@@ -101,13 +101,14 @@ impl<'n> CountDown<'n> {
         codes: &'n [u16],
         expected: CountDownSetup,
     ) -> Self {
-        let slowest = |cell: usize| {
+        let slowest = |cell: CellId| {
             let arcs = timing.cell_delays(cell).as_flattened().iter();
             arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
                 .max()
                 .unwrap_or(0)
         };
-        let all: i64 = (0..netlist.cells().len())
+        let all: i64 = netlist
+            .cells_below(ScopeId::TOP)
             .map(|cell| i64::from(slowest(cell)))
             .sum();
         CountDown {

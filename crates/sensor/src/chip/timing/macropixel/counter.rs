@@ -72,7 +72,7 @@ impl CounterDelays {
         let all_data = circuit.counting.iter().map(|&cell| circuit.pin(cell, 0));
         let later_stages = paths.stage_clocks().filter(|&clock| clock != counter_clk);
         let controls = circuit.counting.iter().flat_map(|&cell| {
-            let inputs = circuit.netlist.cells()[cell].inputs;
+            let inputs = circuit.netlist.cells()[cell.index()].inputs;
             inputs.into_iter().flatten().skip(2)
         });
         let hits = circuit.probes.latched().iter();

@@ -107,7 +107,7 @@ impl Leveliser<'_> {
         }
         // Where the flip-flop's clock comes is told by the delay with which it was given its place.
         let to_output = self.longest_delay(index, CLOCK);
-        let of_register = &survey.timing.cell_delays(register)[CLOCK][output];
+        let of_register = &survey.timing.cell_delays(CellId::new(register))[CLOCK][output];
         let (rise, fall) = (
             i64::from(of_register.rise_fs),
             i64::from(of_register.fall_fs),

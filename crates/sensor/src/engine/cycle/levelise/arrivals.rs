@@ -69,13 +69,16 @@ impl Leveliser<'_> {
         let outputs = self.survey.netlist.cells()[arc.cell].outputs;
         let output = outputs.iter().position(|&net| net == Some(to.0));
         let output = output.expect("an arc leads to an output");
-        i64::from(self.survey.timing.cell_delays(arc.cell)[arc.pin][output].delay_fs(to.1.level()))
+        i64::from(
+            self.survey.timing.cell_delays(CellId::new(arc.cell))[arc.pin][output]
+                .delay_fs(to.1.level()),
+        )
     }
 
     /// The longest delay to any output: a draft of a flip-flop stands for what both of them do.
     pub(super) fn longest_delay(&self, cell: usize, pin: usize) -> i64 {
         let leaf = &self.survey.netlist.cells()[cell];
-        let arcs = &self.survey.timing.cell_delays(cell)[pin];
+        let arcs = &self.survey.timing.cell_delays(CellId::new(cell))[pin];
         let connected = arcs
             .iter()
             .zip(leaf.outputs)
@@ -200,7 +203,7 @@ impl Leveliser<'_> {
             return Err(self.ambiguous(node.0, (early, late)));
         } else if is_released {
             return Err(LevelisationError::Clear(
-                self.survey.netlist.cell_path(arc.cell),
+                self.survey.netlist.cell_path(CellId::new(arc.cell)),
             ));
         } else {
             None

@@ -107,7 +107,7 @@ impl Leveliser<'_> {
             let is_own = |cell: &&usize| Self::controls_of(&cells[**cell]).any(|n| n == cause.net);
             if let Some(&cell) = released.find(|cell| cause.value && is_own(cell)) {
                 return Err(LevelisationError::Clear(
-                    self.survey.netlist.cell_path(cell),
+                    self.survey.netlist.cell_path(CellId::new(cell)),
                 ));
             }
             if held.len() == reach.held.len() {
