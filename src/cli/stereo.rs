@@ -9,8 +9,9 @@ use serde::Serialize;
 
 use super::voice::{notes, say_json, tell};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
-use crate::report::{Cell, DepthMap, Table, write_npy_f32};
+use crate::report::{Category, Cell, DepthMap, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
+use crate::system::NoDepth;
 
 /// Arguments of `gdtof stereo`.
 #[derive(Args)]
@@ -352,7 +353,10 @@ pub(super) fn disparity_picture(
             false => (first + matcher.disparities as f32, first),
         },
         unit: "px",
-        categories: &["none"],
+        categories: &[Category {
+            name: "none",
+            pattern: NoDepth::NoGuide.pattern(),
+        }],
         scale: (512 / map.width()).max(1),
     };
     picture.write_png(path)
