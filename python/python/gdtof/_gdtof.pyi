@@ -10,6 +10,8 @@ from typing_extensions import Unpack
 from ._keys import SceneName, SensorKeys, SensorName
 
 __all__ = [
+    "DEPTH_COLOURS",
+    "PATTERNS",
     "REASONS",
     "Drive",
     "Guide",
@@ -20,6 +22,7 @@ __all__ = [
     "__version__",
     "bin_edges",
     "confidence",
+    "depth_scale_m",
     "detector_agreement",
     "detector_checked",
     "detector_crosstalk",
@@ -43,6 +46,8 @@ __all__ = [
 ]
 
 __version__: str
+DEPTH_COLOURS: tuple[tuple[int, int, int], ...]
+PATTERNS: tuple[tuple[tuple[int, int, int, int], ...], ...]
 REASONS: tuple[str, ...]
 
 @final
