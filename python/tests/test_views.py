@@ -85,11 +85,11 @@ def test_maps_have_the_colours_and_patterns_of_depth_png(frame: gdtof.Frame, tmp
     colours, patterns = depth_map.get_images()
     has_depth = (frame.reason == gdtof.Reason.DEPTH).repeat(side, 0).repeat(side, 1)
     # A depth has one of 224 colours there.
-    ours = (colours.to_rgba(colours.get_array())[..., :3] * 255).repeat(side, 0).repeat(side, 1)
+    ours = (colours.to_rgba(np.asarray(colours.get_array()))[..., :3] * 255).repeat(side, 0).repeat(side, 1)
     assert has_depth.any() and (~has_depth).any()
     assert np.abs(drawn - ours)[has_depth].max() < 4
     tiles = pattern_image(frame.reason)
-    assert np.array_equal(tiles, patterns.get_array())
+    assert np.array_equal(tiles, np.asarray(patterns.get_array()))
     # Tiles repeat all over a cell: the pixels of the first ones.
     step = tiles.shape[0] // rows
     for y in range(4):

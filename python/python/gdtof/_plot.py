@@ -110,7 +110,7 @@ def plot_maps(frame: FrameArrays, maps: list[Map], title: str | None, show: bool
     if title:
         figure.suptitle(title)
     show_figure(figure, show)
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def _map(figure: Any, ax: Any, name: Map, array: Any, scale_m: tuple[float, float], bin_m: float) -> None:
@@ -132,15 +132,17 @@ def _missing(frame: FrameArrays, name: Map) -> NDArray[np.uint8]:
     """Why a map has no value, as :class:`Reason`; 0 where it has one, or where no reason is shown."""
     if name in ("depth", "reason"):
         return frame.reason
-    if name == "peak":
-        return np.where(np.isnan(frame.peak), frame.reason, np.uint8(0))
+    missing = np.zeros_like(frame.reason)
     sees_nothing = np.isnan(frame.truth)
-    if name == "truth":
-        return np.where(sees_nothing, np.uint8(Reason.NO_SURFACE), np.uint8(0))
-    if name == "guide":
-        why = np.where(sees_nothing, np.uint8(Reason.NO_SURFACE), np.uint8(Reason.NO_GUIDE))
-        return np.where(np.isnan(frame.guide), why, np.uint8(0))
-    return np.zeros_like(frame.reason)
+    if name == "peak":
+        has_none = np.isnan(frame.peak)
+        missing[has_none] = frame.reason[has_none]
+    elif name == "truth":
+        missing[sees_nothing] = Reason.NO_SURFACE
+    elif name == "guide":
+        missing[np.isnan(frame.guide)] = Reason.NO_GUIDE
+        missing[np.isnan(frame.guide) & sees_nothing] = Reason.NO_SURFACE
+    return missing
 
 
 def pattern_image(reason: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -165,7 +167,7 @@ def _patterns(ax: Any, missing: NDArray[np.uint8]) -> None:
     image.set_mouseover(False)
 
 
-class _PatternHandler(HandlerBase):  # type: ignore[misc]
+class _PatternHandler(HandlerBase):
     """Draws a reason's tiles in a legend."""
 
     def create_artists(

@@ -84,10 +84,12 @@ class Waveform:
 
         Of a bus it is shown where it is not 0; unknown is half way. In a script a window opens, unless `show` is false or `ax` is yours.
         """
-        from ._plot import plt, show_figure
+        from ._plot import show_figure
 
         figure: Figure | None = None
         if ax is None:
+            import matplotlib.pyplot as plt
+
             figure, ax = plt.subplots(figsize=(9.0, 0.5 + 0.6 * len(names)), layout="constrained")
         assert ax is not None
         ends_fs = [origin_fs + round(1e6 * ns) for ns in span_ns]
