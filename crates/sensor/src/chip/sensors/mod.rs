@@ -122,11 +122,7 @@ mod tests {
             // The file with reasons reads back unchanged, and has them all.
             let notes = Sensor::built_in_notes(name).unwrap();
             let text = chip().commented_with(&notes);
-            assert_eq!(
-                SensorConfig::parse(name, &text).unwrap(),
-                **chip(),
-                "{name}"
-            );
+            assert_eq!(SensorConfig::parse(name, &text).unwrap(), *chip(), "{name}");
             let (_, keys) = text.split_once("# A sensor").unwrap();
             assert!(keys.matches("# Why: ").count() >= 5, "{name}");
         }
