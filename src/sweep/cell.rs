@@ -58,7 +58,10 @@ impl Column {
             .last()
             .is_some_and(|last| plain(last) == plain(self.unit));
         let kept = words.len() - usize::from(ends_in_unit && words.len() > 1);
-        words[..kept].join(" ")
+        match words[..kept] {
+            ["p", ref of @ ..] => format!("probability of {}", of.join(" ")),
+            ref words => words.join(" "),
+        }
     }
 }
 
@@ -204,6 +207,7 @@ mod tests {
             ("theory.range_m", "m", "range (m)"),
             ("share_within_a_bin", "", "share within a bin"),
             ("depths", "", "depths"),
+            ("p_detection", "", "probability of detection"),
         ] {
             let column = Column::new(name, unit, Holds::Number);
             assert_eq!(column.label(), label);
