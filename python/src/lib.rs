@@ -29,9 +29,17 @@ mod theory;
 mod timing;
 mod values;
 
-use guided_dtof::system::NoDepth;
+use guided_dtof::report::DEPTH_COLOURS;
+use guided_dtof::system::{NoDepth, frame_scale_m};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+
+/// Depths at the ends of a frame's colour scale, m.
+#[pyfunction]
+#[pyo3(signature = (depths_m, /))]
+fn depth_scale_m(depths_m: Vec<f64>) -> (f32, f32) {
+    frame_scale_m(depths_m)
+}
 
 /// What the package `gdtof` is made on.
 #[pymodule]
@@ -54,6 +62,8 @@ mod _gdtof {
     #[pymodule_export]
     use super::counts::range_counts;
     #[pymodule_export]
+    use super::depth_scale_m;
+    #[pymodule_export]
     use super::detector::{
         detector_agreement, detector_checked, detector_crosstalk, detector_expected, detector_file,
         detector_range,
@@ -75,8 +85,14 @@ mod _gdtof {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        let reasons = NoDepth::ALL.map(NoDepth::name);
+        let categories = NoDepth::categories();
+        let reasons = categories.map(|category| category.name);
         module.add("REASONS", PyTuple::new(module.py(), reasons)?)?;
+        let patterns = categories.map(|category| category.pattern.levels().map(<[u8; 4]>::into));
+        let patterns = patterns.map(|rows: [(u8, u8, u8, u8); 4]| <(_, _, _, _)>::from(rows));
+        module.add("PATTERNS", PyTuple::new(module.py(), patterns)?)?;
+        let colours = DEPTH_COLOURS.map(<(u8, u8, u8)>::from);
+        module.add("DEPTH_COLOURS", PyTuple::new(module.py(), colours)?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

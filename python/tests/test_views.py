@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
 
 import gdtof
+from gdtof._arrays import reason_name
+from gdtof._plot import pattern_image
 
 
 def test_pictures_are_drawn(frame: gdtof.Frame, tmp_path: Path) -> None:
@@ -28,6 +33,74 @@ def test_pictures_are_drawn(frame: gdtof.Frame, tmp_path: Path) -> None:
         frame.plot_histogram(16, 0)
     with pytest.raises(gdtof.InputError, match="is not a map; give depth"):
         frame.plot("dept")  # type: ignore[arg-type]
+
+
+def test_scripts_show_windows(frame: gdtof.Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[int] = []
+    monkeypatch.setattr(plt, "show", lambda: shown.append(len(plt.get_fignums())))
+    plt.close("all")
+    is_on = np.argwhere(frame.reason == gdtof.Reason.DEPTH)[0]
+    row, col = int(is_on[0]), int(is_on[1])
+    # This backend has no windows.
+    frame.plot()
+    frame.plot_histogram(row, col)
+    assert shown == [] and plt.get_fignums() == []
+    monkeypatch.setattr(FigureCanvasAgg, "required_interactive_framework", "qt")
+    frame.plot()
+    assert shown == [1] and len(plt.get_fignums()) == 1
+    plt.close("all")
+    frame.plot_histogram(row, col)
+    assert shown == [1, 1]
+    plt.close("all")
+    frame.plot(show=False)
+    frame.plot_histogram(row, col, show=False)
+    assert shown == [1, 1] and plt.get_fignums() == []
+    # Axes of yours are yours to show.
+    figure, ax = plt.subplots()
+    frame.plot_histogram(row, col, ax)
+    assert shown == [1, 1] and plt.get_fignums() == [figure.number]
+    plt.close("all")
+
+
+def test_titles_are_words_with_units(frame: gdtof.Frame) -> None:
+    figure = frame.plot(["depth", "guide", "truth", "peak", "error", "confidence", "reason", "counts"])
+    maps = [ax for ax in figure.axes if ax.get_title()]
+    bars = [ax.get_ylabel() for ax in figure.axes if ax.get_ylabel()]
+    assert len(maps) == 8 and len(bars) == 7
+    for text in [ax.get_title() for ax in maps] + bars:
+        assert "_" not in text and ".toml" not in text
+    assert all(ax.get_title()[0].isupper() for ax in maps)
+    assert bars.count("distance (m)") == 4 and "error (m)" in bars
+
+
+def test_maps_have_the_colours_and_patterns_of_depth_png(frame: gdtof.Frame, tmp_path: Path) -> None:
+    """Pixel by pixel: what `gdtof frame` draws with its own code, and what goes into the axes here."""
+    frame.save(tmp_path)
+    rows, cols, _ = frame.shape
+    side = 512 // max(rows, cols)
+    with Image.open(tmp_path / "depth.png") as picture:
+        # Below a title, within a margin; image.rs has them.
+        drawn = np.asarray(picture.convert("RGB"))[40:][: rows * side, 12:][:, : cols * side].astype(int)
+    depth_map = frame.plot("depth").axes[0]
+    colours, patterns = depth_map.get_images()
+    has_depth = (frame.reason == gdtof.Reason.DEPTH).repeat(side, 0).repeat(side, 1)
+    # A depth has one of 224 colours there.
+    ours = (colours.to_rgba(np.asarray(colours.get_array()))[..., :3] * 255).repeat(side, 0).repeat(side, 1)
+    assert has_depth.any() and (~has_depth).any()
+    assert np.abs(drawn - ours)[has_depth].max() < 4
+    tiles = pattern_image(frame.reason)
+    assert np.array_equal(tiles, np.asarray(patterns.get_array()))
+    # Tiles repeat all over a cell: the pixels of the first ones.
+    step = tiles.shape[0] // rows
+    for y in range(4):
+        for x in range(4):
+            there, here = drawn[y::side, x::side], tiles[y::step, x::step]
+            lost = frame.reason != gdtof.Reason.DEPTH
+            assert np.array_equal(there[lost], here[..., :3][lost]), (y, x)
+    legend = depth_map.figure.legends[0]
+    texts = [text.get_text() for text in legend.get_texts()]
+    there_are = [why for why in gdtof.Reason if why is not gdtof.Reason.DEPTH and (frame.reason == why).any()]
+    assert sorted(texts) == sorted(f"{reason_name(why)} {(frame.reason == why).sum()}" for why in there_are)
 
 
 def test_datasets_have_dimensions_and_units(frame: gdtof.Frame) -> None:

@@ -18,7 +18,7 @@ use crate::report::{DepthImage, ImageCell, NpyStack, Table};
 use crate::request::{ExposureReport, Spelling, check_drive_times};
 use crate::system::{
     DriveFrame, DriveReuse, DriveSettings, DriveSimulation, FrameClock, FrameSummary, FrameTimes,
-    NoDepth, Noise, PhaseTimes, WindowPolicy,
+    NoDepth, Noise, PhaseTimes, WindowPolicy, drive_scale_m,
 };
 
 /// Arguments of `gdtof drive`.
@@ -411,9 +411,6 @@ fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Resul
             (None, why) => ImageCell::Category(why.map_or(0, |why| why as usize)),
         })
         .collect();
-    let stereo = &settings.frame.scene.stereo;
-    let metre_pixels = stereo.camera().focal_px * stereo.baseline_m;
-    let range_m = [stereo.max_disparity_px, stereo.min_disparity_px].map(|px| metre_pixels / px);
     let title = format!(
         "frame {}, exposed at {:.3} s",
         frame.number,
@@ -423,9 +420,9 @@ fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Resul
         title: &title,
         cols: settings.frame.sensor.cols,
         cells: &cells,
-        range_m: (range_m[0] as f32, (range_m[1] as f32).min(200.0)),
+        range_m: drive_scale_m(&settings.frame.scene),
         unit: "m",
-        categories: &NoDepth::ALL.map(NoDepth::name),
+        categories: &NoDepth::categories(),
         scale: 8,
     }
     .write_png(path)

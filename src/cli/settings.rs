@@ -14,6 +14,7 @@ use crate::files::InputError;
 use crate::netlist::{Conditions, Corner, Mismatch};
 use crate::request::{Sources, Spelling};
 use crate::scene::Scene;
+use crate::settings::Notes;
 
 /// Which sensor.
 #[derive(Args)]
@@ -95,6 +96,14 @@ impl SensorArgs {
         let has_size = self.rows.is_some() || self.cols.is_some();
         let is_given = has_file || has_size || !self.block.is_empty() || !self.set.is_empty();
         is_given.then(|| self.read()).transpose()
+    }
+
+    /// Why the values of the chip were chosen, if it is built in.
+    fn notes(&self) -> Notes {
+        let sources = self.sources(None);
+        let default = self.sensor.is_none().then_some(CHIPS[0].0);
+        let name = sources.chip().or(default);
+        name.and_then(Sensor::built_in_notes).unwrap_or_default()
     }
 
     /// What the top of the exported chip is called: modes of a chip are named after it.
@@ -189,6 +198,13 @@ impl SceneArgs {
         self.sources().scene_name()
     }
 
+    /// Why the values of the scene were chosen, if it is built in.
+    fn notes(&self) -> Notes {
+        let name = self.scene_name();
+        let name = name.strip_prefix("built-in ");
+        name.and_then(Scene::built_in_notes).unwrap_or_default()
+    }
+
     fn sources(&self) -> Sources {
         self.sensor.sources(self.scene.clone())
     }
@@ -203,7 +219,8 @@ pub(super) fn print_sensor(args: PrintSensorArgs) -> anyhow::Result<()> {
         sensor: args.chip.or(args.sensor.sensor),
         ..args.sensor
     };
-    Ok(say_file(sensor.read()?.commented())?)
+    let notes = sensor.notes();
+    Ok(say_file(sensor.read()?.commented_with(&notes))?)
 }
 
 /// `gdtof scene`.
@@ -211,8 +228,9 @@ pub(super) fn print_sensor(args: PrintSensorArgs) -> anyhow::Result<()> {
 /// # Errors
 /// Bad input.
 pub(super) fn print_scene(args: PrintSceneArgs) -> anyhow::Result<()> {
-    let (_, scene) = args.scene.or_file(args.world).read()?;
-    Ok(say_file(scene.commented())?)
+    let args = args.scene.or_file(args.world);
+    let (_, scene) = args.read()?;
+    Ok(say_file(scene.commented_with(&args.notes()))?)
 }
 
 // What the chip is made of and where it is operated: `--process`, `--voltage`, `--temperature`, `--mismatch`.

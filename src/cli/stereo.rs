@@ -9,8 +9,9 @@ use serde::Serialize;
 
 use super::voice::{notes, say_json, say_unless_quiet};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
-use crate::report::{DepthImage, ImageCell, Table, write_npy_f32};
+use crate::report::{Category, DepthImage, ImageCell, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
+use crate::system::NoDepth;
 
 /// Arguments of `gdtof stereo`.
 #[derive(Args)]
@@ -357,7 +358,10 @@ pub(super) fn disparity_picture(
             (first + matcher.disparities as f32, first)
         },
         unit: "px",
-        categories: &["none"],
+        categories: &[Category {
+            name: "none",
+            pattern: NoDepth::NoGuide.pattern(),
+        }],
         scale: (512 / map.width()).max(1),
     };
     picture.write_png(path)

@@ -223,7 +223,7 @@ fn write(
     let missing = missing.map_err(plain)?;
     check(missing)?;
     for (drawing, plot) in drawings.into_iter().zip(plots) {
-        let chart = drawing.chart(study, "--plot")?;
+        let chart = drawing.chart("--plot")?;
         chart.write(&set.staging().join(plot.file_name() + ".svg"))?;
     }
     let configuration = Configuration {

@@ -1,7 +1,7 @@
 // Measured points in space, one for each return: x to the right, y forward, z up. It turns.
 
 const COLOURS = [
-  { name: "depth", of: (f) => f.depth, scale: VIRIDIS, range: depths, by: Math.log, unit: "m", ofReturn: Math.log },
+  { name: "depth", of: (f) => f.depth, scale: DEPTHS, range: () => meta.scale_m, unit: "m", ofReturn: (range) => range },
   { name: "error", of: (f) => f.error, scale: DIVERGING, range: errors, unit: "m" },
   { name: "confidence", of: (f) => f.confidence, scale: INFERNO, range: confidences, by: Math.log1p, unit: "" },
 ];

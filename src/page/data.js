@@ -56,6 +56,3 @@ function quantile(values, share) {
   const sorted = Array.from(values).filter(Number.isFinite).sort((a, b) => a - b);
   return sorted.length ? sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] : NaN;
 }
-
-const rowsOf = (values, cols) =>
-  Array.from({ length: values.length / cols }, (_, row) => Array.from(values.subarray(row * cols, (row + 1) * cols), (v) => (Number.isFinite(v) ? v : null)));

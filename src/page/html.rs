@@ -9,9 +9,10 @@ const PLOTLY: &str = include_str!("plotly.min.js");
 const STYLE: &str = include_str!("page.css");
 
 /// In the order in which they run.
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("data.js"),
     include_str!("looks.js"),
+    include_str!("raster.js"),
     include_str!("maps.js"),
     include_str!("histogram.js"),
     include_str!("cloud.js"),

@@ -27,11 +27,10 @@ function axis(title, more) {
 
 const plotting = { displayModeBar: false, responsive: true };
 
-const VIRIDIS = [[0, "#440154"], [0.25, "#3b528b"], [0.5, "#21918c"], [0.75, "#5ec962"], [1, "#fde725"]];
 const INFERNO = [[0, "#1b0c41"], [0.3, "#781c6d"], [0.6, "#ed6925"], [1, "#fcffa4"]];
 const DIVERGING = [[0, "#2166ac"], [0.5, "#f2f2f2"], [1, "#b2182b"]];
 const GREYS = [[0, "#000000"], [1, "#ffffff"]];
-// No depth, reason by reason, in colours that those who do not tell red from green keep apart; the first is a depth.
-const REASONS = ["#4c9f70", "#8fb8de", "#6c757d", "#b39ddb", "#2f3640", "#f2c14e", "#d1495b", "#e58f65", "#7f4f24"];
+// Those of depth.png, from near to far.
+const DEPTHS = meta.depth_colours.map((rgb, at, all) => [at / (all.length - 1), "#" + rgb.map((c) => c.toString(16).padStart(2, "0")).join("")]);
 
 const ramp = (scale) => "linear-gradient(90deg," + scale.map(([at, c]) => c + " " + 100 * at + "%").join(",") + ")";

@@ -168,6 +168,9 @@ async function begin() {
     }
   });
   makeMaps(element("maps"), pointTo);
+  new ResizeObserver(() => requestAnimationFrame(() => {
+    if (current && !areMapsSharp()) drawMaps(current);
+  })).observe(element("maps"));
   element("colour").append(...COLOURS.map((by, at) => new Option("by " + by.name, at)));
   element("colour").addEventListener("change", (event) => colourBy(Number(event.target.value)));
   element("theme").addEventListener("click", toggleTheme);

@@ -1,28 +1,13 @@
-// Maps of the array with one pointer: camera, guide, truth, depth, error, confidence, reason.
-
-const everyDepth = { least: Infinity, most: 0 };
+// Maps of the array with one pointer: camera, guide, truth, depth with the reason where there is none, error, confidence.
 
 const MAPS = [
   { name: "camera", title: "Camera view", of: (f) => f.camera, across: meta.across, scale: GREYS, range: () => [0, 255], say: (f, p) => meta.objects[f.object[p] - 1] ?? "sky" },
-  { name: "guide", title: "Guide", of: (f) => f.guide, scale: VIRIDIS, range: depths, by: Math.log, unit: "m" },
-  { name: "truth", title: "Truth", of: (f) => f.truth, scale: VIRIDIS, range: depths, by: Math.log, unit: "m" },
-  { name: "depth", title: "Depth", of: (f) => f.depth, scale: VIRIDIS, range: depths, by: Math.log, unit: "m" },
-  { name: "error", title: "Error", of: (f) => f.error, scale: DIVERGING, range: errors, unit: "m", digits: 3 },
+  { name: "guide", title: "Guide", of: (f) => f.guide, scale: DEPTHS, range: () => meta.scale_m, unit: "m", patternAt: (f, p) => (Number.isFinite(f.guide[p]) ? null : patternOf(Number.isFinite(f.truth[p]) ? "no guide" : "no surface")) },
+  { name: "truth", title: "Truth", of: (f) => f.truth, scale: DEPTHS, range: () => meta.scale_m, unit: "m", patternAt: (f, p) => (Number.isFinite(f.truth[p]) ? null : patternOf("no surface")) },
+  { name: "depth", title: "Depth", of: (f) => f.depth, scale: DEPTHS, range: () => meta.scale_m, unit: "m", patternAt: (f, p) => meta.reasons[f.reason[p] - 1], say: (f, p) => (f.reason[p] ? reasonOf(f, p) : shown(f.depth[p], 2, "m")) },
+  { name: "error", title: "Error, depth less truth", of: (f) => f.error, scale: DIVERGING, range: errors, unit: "m", digits: 3 },
   { name: "confidence", title: "Confidence", of: (f) => f.confidence, scale: INFERNO, range: confidences, by: Math.log1p, unit: "", digits: 1 },
-  { name: "reason", title: "Reason", of: (f) => Float32Array.from(f.reason), scale: steps(), range: () => [-0.5, REASONS.length - 0.5], say: (f, p) => reasonOf(f, p) },
 ];
-
-// Frames of a drive share the scale that the widest of those seen so far asks for.
-function depths(f) {
-  for (const map of [f.truth, f.depth]) {
-    const [least, most] = [quantile(map, 0.01), quantile(map, 0.99)];
-    if (Number.isFinite(least)) {
-      everyDepth.least = Math.min(everyDepth.least, least);
-      everyDepth.most = Math.max(everyDepth.most, most);
-    }
-  }
-  return everyDepth.most > 0 ? [Math.max(0.1, everyDepth.least), Math.max(everyDepth.most, everyDepth.least + 1)] : [0.1, 1];
-}
 
 function confidences(f) {
   return [0, Math.max(1, quantile(f.confidence, 0.98) || 0)];
@@ -33,12 +18,8 @@ function errors(f) {
   return [-most, most];
 }
 
-function steps() {
-  const n = REASONS.length;
-  return REASONS.flatMap((c, at) => [[at / n, c], [(at + 1) / n, c]]);
-}
-
-const reasonOf = (f, p) => (f.reason[p] ? meta.reasons[f.reason[p] - 1] : "depth found");
+const patternOf = (name) => meta.reasons.find((reason) => reason.name === name);
+const reasonOf = (f, p) => (f.reason[p] ? meta.reasons[f.reason[p] - 1].name : "depth");
 const shown = (value, digits, unit) => (Number.isFinite(value) ? value.toFixed(digits) + (unit ? " " + unit : "") : "–");
 
 function makeMaps(section, onPoint) {
@@ -53,19 +34,18 @@ function makeMaps(section, onPoint) {
     box.title = map.title;
     box.id = "map-" + map.name;
     box.style.aspectRatio = meta.cols + " / " + meta.rows * meta.aspect;
-    const plot = document.createElement("div");
-    plot.className = "plot";
+    const canvas = document.createElement("canvas");
     const marks = ["line across", "line down", "cross"].map((kind) => {
       const mark = document.createElement("div");
       mark.className = kind;
       return mark;
     });
-    box.append(plot, ...marks);
+    box.append(canvas, ...marks);
     const bar = document.createElement("div");
     bar.className = "bar";
     figure.append(caption, box, bar);
     section.append(figure);
-    Object.assign(map, { box, plot, bar, marks, value });
+    Object.assign(map, { box, canvas, bar, marks, value });
     const point = (event) => {
       const at = box.getBoundingClientRect();
       const within = (x, size, n) => Math.min(n - 1, Math.max(0, Math.floor((x / size) * n)));
@@ -83,15 +63,19 @@ function makeMaps(section, onPoint) {
 
 function drawMaps(f) {
   for (const map of MAPS) {
-    const cols = meta.cols * (map.across ?? 1);
     const [least, most] = map.range(f);
     const by = map.by ?? ((value) => value);
-    const trace = { type: "heatmap", z: rowsOf(map.of(f).map(by), cols), colorscale: map.scale, zmin: by(least), zmax: by(most), showscale: false, hoverinfo: "skip", zsmooth: false };
-    const bare = { visible: false, fixedrange: true };
-    Plotly.react(map.plot, [trace], layout({ margin: { l: 0, r: 0, t: 0, b: 0 }, xaxis: bare, yaxis: { ...bare, autorange: "reversed" } }), { staticPlot: true, responsive: true });
+    const across = map.across ?? 1;
+    const colours = map.of(f).map(by);
+    const colourAt = (cell) => shade(map.scale, (colours[cell] - by(least)) / (by(most) - by(least)));
+    const patternAt = (cell) => map.patternAt?.(f, cell);
+    paint(map.canvas, [meta.rows * across, meta.cols * across], colourAt, patternAt);
     legendOf(map, f, least, most);
   }
 }
+
+// Whether every pixel of the screen has its own in the maps: not after the window has changed.
+const areMapsSharp = () => MAPS.every(({ box, canvas }) => screenSize(box)[0] === canvas.width);
 
 function legendOf(map, f, least, most) {
   map.bar.replaceChildren();
@@ -100,17 +84,6 @@ function legendOf(map, f, least, most) {
     span.textContent = words;
     return span;
   };
-  if (map.name === "reason") {
-    const there = new Set(f.reason);
-    for (const why of [...there].sort((a, b) => a - b)) {
-      const entry = text(why ? meta.reasons[why - 1] : "depth");
-      const swatch = document.createElement("i");
-      swatch.style.background = REASONS[why];
-      entry.prepend(swatch);
-      map.bar.append(entry);
-    }
-    return;
-  }
   if (map.name === "camera") return;
   const strip = document.createElement("div");
   strip.className = "ramp";
@@ -118,6 +91,23 @@ function legendOf(map, f, least, most) {
   const digits = most - least > 20 ? 0 : most - least > 2 ? 1 : 2;
   map.bar.append(text(least.toFixed(digits)), strip, text(shown(most, digits, map.unit)));
   if (map.by) map.bar.title = "logarithmic";
+  if (map.name !== "depth") return;
+  const reasons = document.createElement("div");
+  reasons.className = "reasons";
+  reasons.append(...reasonsOf(f).map(([reason, count]) => {
+    const [entry, sample] = [text(reason.name + " " + count), document.createElement("canvas")];
+    sample.className = "sample";
+    entry.prepend(sample);
+    paintSample(sample, reason);
+    return entry;
+  }));
+  map.bar.append(reasons);
+}
+
+// Reasons that occur, each with the number of its macropixels, in their order.
+function reasonsOf(f) {
+  const counts = meta.reasons.map((reason, at) => [reason, f.reason.reduce((n, why) => n + (why === at + 1), 0)]);
+  return counts.filter(([, count]) => count > 0);
 }
 
 function pointMaps(f, row, col) {

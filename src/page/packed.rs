@@ -28,8 +28,11 @@ use super::recording::{Recorded, Recording};
 use crate::chip::SensorConfig;
 use crate::files::InputError;
 use crate::guide::view;
+use crate::report::{Category, DEPTH_COLOURS, Rgb, SMALLEST_TILED_CELL_PX};
 use crate::scene::{DVec3, Ray, Scene, Stage};
-use crate::system::{DepthReturn, NoDepth, RETURNS, Ranger, TakenSettings};
+use crate::system::{
+    DepthReturn, NoDepth, RETURNS, Ranger, TakenSettings, drive_scale_m, frame_scale_m,
+};
 use crate::units::TimeOfFlight;
 
 /// Pixels of the camera view across a macropixel.
@@ -71,11 +74,24 @@ pub(super) struct Meta {
     to: [f64; 2],
     /// Standard deviation of the echo as a range, m.
     sigma_m: f64,
-    reasons: Vec<&'static str>,
+    reasons: Vec<Reason>,
+    /// Depths at the ends of the colour scale, m, and its colours from near to far.
+    scale_m: (f32, f32),
+    depth_colours: [Rgb; DEPTH_COLOURS.len()],
+    /// Cells of fewer pixels have the mean of their pattern.
+    smallest_tiled_px: usize,
     objects: Vec<String>,
     edges_m: Vec<Vec<f32>>,
     probes: Vec<(usize, usize)>,
     times: Vec<FrameMeta>,
+}
+
+/// A reason for no depth, and what its macropixels look like.
+#[derive(Debug, Serialize)]
+struct Reason {
+    name: &'static str,
+    levels: [[u8; 4]; 4],
+    mean: u8,
 }
 
 #[derive(Debug, Serialize)]
@@ -126,10 +142,23 @@ impl Packed {
         let ranger = Ranger::new(sensor, exposure, scene, depth, calibration);
         let ranger = ranger.map_err(|why| InputError::new(folder.display(), why.to_string()))?;
         let mut windows = Windows::default();
-        let arrays: Vec<Vec<u8>> = (recording.frames.iter())
-            .map(|frame| arrays(recording, frame, &ranger, &mut windows))
+        let packed_frames: Vec<PackedFrame> = (recording.frames.iter())
+            .map(|frame| PackedFrame::new(recording, frame, &ranger, &mut windows))
             .collect();
-        let frames = arrays.par_iter().map(|bytes| compressed(bytes)).collect();
+        let scale_m = if recording.is_drive {
+            drive_scale_m(scene)
+        } else {
+            frame_scale_m(
+                packed_frames
+                    .iter()
+                    .flat_map(|frame| &frame.depths_m)
+                    .copied(),
+            )
+        };
+        let frames = packed_frames
+            .par_iter()
+            .map(PackedFrame::compressed)
+            .collect();
         let camera = scene.lidar_camera(sensor.rows as u32, sensor.cols as u32);
         let corner = |at: (usize, usize)| {
             let towards = camera.at_unit_depth((at.0 as f64, at.1 as f64));
@@ -161,7 +190,10 @@ impl Packed {
             from: corner((0, 0)),
             to: corner((sensor.cols, sensor.rows)),
             sigma_m: scene.pulse_resolution().as_range_m(),
-            reasons: NoDepth::ALL.map(NoDepth::name).to_vec(),
+            reasons: Vec::from(NoDepth::categories().map(Reason::from)),
+            scale_m,
+            depth_colours: DEPTH_COLOURS,
+            smallest_tiled_px: SMALLEST_TILED_CELL_PX,
             objects: scene.objects.iter().map(|o| o.name.clone()).collect(),
             edges_m: windows.edges_m,
             probes: recording.probes.clone(),
@@ -171,67 +203,95 @@ impl Packed {
     }
 }
 
+impl From<Category<'static>> for Reason {
+    fn from(category: Category<'static>) -> Self {
+        Reason {
+            name: category.name,
+            levels: *category.pattern.levels(),
+            mean: category.pattern.mean(),
+        }
+    }
+}
+
 /// The arrays of a frame.
-fn arrays(
-    recording: &Recording,
-    frame: &Recorded,
-    ranger: &Ranger<'_>,
-    windows: &mut Windows,
-) -> Vec<u8> {
-    let TakenSettings { sensor, scene, .. } = &recording.settings;
-    let bins = sensor.bins;
-    let counts_of = |pixel: usize| &frame.counts[pixel * bins..(pixel + 1) * bins];
-    let found: Vec<_> = (frame.known.par_iter())
-        .map(|known| {
-            let counts = counts_of(known.pixel);
-            (ranger.depth(known, counts), ranger.peak(known, counts))
-        })
-        .collect();
-    let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);
-    let mut bytes = Vec::new();
-    let mut floats = |of: &dyn Fn(usize) -> Option<f64>| {
-        for pixel in 0..found.len() {
-            bytes.extend(metres(of(pixel)).to_le_bytes());
+struct PackedFrame {
+    bytes: Vec<u8>,
+    /// Of macropixels that have one.
+    depths_m: Vec<f64>,
+}
+
+impl PackedFrame {
+    fn new(
+        recording: &Recording,
+        frame: &Recorded,
+        ranger: &Ranger<'_>,
+        windows: &mut Windows,
+    ) -> Self {
+        let TakenSettings { sensor, scene, .. } = &recording.settings;
+        let bins = sensor.bins;
+        let counts_of = |pixel: usize| &frame.counts[pixel * bins..(pixel + 1) * bins];
+        let found: Vec<_> = (frame.known.par_iter())
+            .map(|known| {
+                let counts = counts_of(known.pixel);
+                (ranger.depth(known, counts), ranger.peak(known, counts))
+            })
+            .collect();
+        let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);
+        let mut bytes = Vec::new();
+        let mut floats = |of: &dyn Fn(usize) -> Option<f64>| {
+            for pixel in 0..found.len() {
+                bytes.extend(metres(of(pixel)).to_le_bytes());
+            }
+        };
+        floats(&|p| found[p].0.true_m);
+        floats(&|p| found[p].0.guide_m);
+        floats(&|p| found[p].0.measured_m);
+        floats(&|p| found[p].0.bound_m);
+        floats(&|p| found[p].0.spread_m);
+        floats(&|p| found[p].0.peak_m);
+        floats(&|p| found[p].0.confidence);
+        floats(&|p| Some(found[p].1?.signal_counts));
+        floats(&|p| Some(found[p].1?.background_per_bin));
+        for of in [
+            (|found| Some(found.depth_m)) as fn(&DepthReturn) -> Option<f64>,
+            |found| found.bound_m,
+            |found| Some(found.photons),
+        ] {
+            for number in 0..RETURNS {
+                floats(&|p| of(found[p].0.returns.get(number)?));
+            }
         }
-    };
-    floats(&|p| found[p].0.true_m);
-    floats(&|p| found[p].0.guide_m);
-    floats(&|p| found[p].0.measured_m);
-    floats(&|p| found[p].0.bound_m);
-    floats(&|p| found[p].0.spread_m);
-    floats(&|p| found[p].0.peak_m);
-    floats(&|p| found[p].0.confidence);
-    floats(&|p| Some(found[p].1?.signal_counts));
-    floats(&|p| Some(found[p].1?.background_per_bin));
-    for of in [
-        (|found| Some(found.depth_m)) as fn(&DepthReturn) -> Option<f64>,
-        |found| found.bound_m,
-        |found| Some(found.photons),
-    ] {
-        for number in 0..RETURNS {
-            floats(&|p| of(found[p].0.returns.get(number)?));
+        for known in &frame.known {
+            let number = known
+                .start
+                .map_or(0, |start| windows.number(ranger, known.pixel, start));
+            bytes.extend(number.to_le_bytes());
         }
+        for known in &frame.known {
+            let start = known.start.map_or(-1, |start| start as i16);
+            bytes.extend(start.to_le_bytes());
+        }
+        let scene = scene.snapshot(frame.time_s);
+        for object in objects(&scene, sensor) {
+            bytes.extend(object.to_le_bytes());
+        }
+        bytes.extend(frame.counts.iter().flat_map(|n| n.to_le_bytes()));
+        bytes.extend(found.iter().map(|(pixel, _)| {
+            NoDepth::number(pixel.no_depth) + if pixel.in_window { IN_WINDOW } else { 0 }
+        }));
+        bytes.extend(picture(&scene, sensor));
+        let depths_m = found
+            .iter()
+            .filter_map(|(pixel, _)| pixel.measured_m)
+            .collect();
+        PackedFrame { bytes, depths_m }
     }
-    for known in &frame.known {
-        let number = known
-            .start
-            .map_or(0, |start| windows.number(ranger, known.pixel, start));
-        bytes.extend(number.to_le_bytes());
+
+    fn compressed(&self) -> String {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+        encoder.write_all(&self.bytes).expect("memory takes all");
+        BASE64_STANDARD.encode(encoder.finish().expect("memory takes all"))
     }
-    for known in &frame.known {
-        let start = known.start.map_or(-1, |start| start as i16);
-        bytes.extend(start.to_le_bytes());
-    }
-    let scene = scene.snapshot(frame.time_s);
-    for object in objects(&scene, sensor) {
-        bytes.extend(object.to_le_bytes());
-    }
-    bytes.extend(frame.counts.iter().flat_map(|n| n.to_le_bytes()));
-    bytes.extend(found.iter().map(|(pixel, _)| {
-        NoDepth::number(pixel.no_depth) + if pixel.in_window { IN_WINDOW } else { 0 }
-    }));
-    bytes.extend(picture(&scene, sensor));
-    bytes
 }
 
 /// What the middle of every macropixel sees, from 1; 0 for the sky.
@@ -261,10 +321,4 @@ fn picture(scene: &Scene, sensor: &SensorConfig) -> Vec<u8> {
         (240.0 * libm::pow(share.clamp(0.0, 1.0625), 1.0 / 2.2)).min(255.0) as u8
     };
     seen.into_iter().map(grey).collect()
-}
-
-fn compressed(bytes: &[u8]) -> String {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    encoder.write_all(bytes).expect("memory takes all");
-    BASE64_STANDARD.encode(encoder.finish().expect("memory takes all"))
 }

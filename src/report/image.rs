@@ -5,7 +5,7 @@
 //!   ┌────────────┐ █ 20 m
 //!   │    map     │ █ 40 m
 //!   └────────────┘ █
-//!   ■ 972 no surface   ■ 60 no guide   …      as many to a row as fit
+//!   □ no surface 972   ▨ no guide 60   …      as many to a row as fit
 //! ```
 //!
 //! Indexed colours keep the file small and every macropixel a clean square.
@@ -14,10 +14,11 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::canvas::{CHARACTER_WIDTH_PX, Canvas, LINE_PX};
-use super::colour::{CATEGORY_COLOURS, Rgb, scale_colour};
+use super::colour::{Rgb, scale_colour};
+use super::pattern::{Category, Pattern, SMALLEST_TILED_CELL_PX};
 use crate::files::{InputError, OutputFile};
 
-/// Palette: depth colours 0 to `STEPS - 1`, shades from paper to ink, then categories.
+/// Palette: depth colours 0 to `STEPS - 1`, shades from paper to ink, then the greys of categories.
 const STEPS: u8 = 224;
 const SHADES: [u8; 16] = {
     let mut shades = [0; 16];
@@ -30,7 +31,9 @@ const SHADES: [u8; 16] = {
 };
 const PAPER: u8 = SHADES[0];
 const INK: u8 = SHADES[15];
-const CATEGORIES: u8 = INK + 1;
+/// The first grey of a category, and how many greys there may be.
+const GREYS: u8 = INK + 1;
+const MOST_GREYS: usize = u8::MAX as usize - INK as usize;
 const PAPER_GREY: f64 = 255.0;
 const INK_GREY: f64 = 20.0;
 
@@ -69,9 +72,8 @@ pub struct DepthImage<'a> {
     pub range_m: (f32, f32),
     /// What stands behind numbers of the scale.
     pub unit: &'a str,
-    /// Names of categories, at most as many as `CATEGORY_COLOURS`; those that occur stand in the legend with
-    /// their numbers.
-    pub categories: &'a [&'a str],
+    /// Why cells have no depth. Those that occur stand in the legend with their numbers. All together they have at most 16 greys.
+    pub categories: &'a [Category<'a>],
     /// Screen pixels of a square's side.
     pub scale: usize,
 }
@@ -83,14 +85,36 @@ impl DepthImage<'_> {
     /// When the file cannot be written, or a picture of this size cannot be made.
     ///
     /// # Panics
-    /// When the cells do not fill rows of `cols`, there are none, `scale` is zero, a category has no name or colour, or the range's
+    /// When the cells do not fill rows of `cols`, there are none, `scale` is zero, categories have too many greys, or the range's
     /// ends are equal.
     pub(crate) fn write_png(&self, path: &Path) -> Result<(), InputError> {
-        let canvas = self.draw();
-        OutputFile::write_with(path, |file| encode(file, &canvas))
+        let greys = self.greys();
+        let canvas = self.draw(&greys);
+        OutputFile::write_with(path, |file| encode(file, &canvas, &greys))
     }
 
-    fn draw(&self) -> Canvas {
+    /// A category's pattern in cells of the map.
+    fn pattern_in_map(&self, category: usize) -> Pattern {
+        let pattern = self.categories[category].pattern;
+        if self.scale < SMALLEST_TILED_CELL_PX {
+            pattern.blurred()
+        } else {
+            pattern
+        }
+    }
+    /// Every grey that categories have, in map and legend.
+    fn greys(&self) -> Vec<u8> {
+        let patterns = self.categories.iter().map(|category| category.pattern);
+        let in_map = (0..self.categories.len()).map(|category| self.pattern_in_map(category));
+        let mut greys: Vec<u8> = (patterns.chain(in_map))
+            .flat_map(|pattern| pattern.levels().concat())
+            .collect();
+        greys.sort_unstable();
+        greys.dedup();
+        assert!(greys.len() <= MOST_GREYS, "too many greys");
+        greys
+    }
+    fn draw(&self, greys: &[u8]) -> Canvas {
         let &DepthImage {
             cols, cells, scale, ..
         } = self;
@@ -101,7 +125,6 @@ impl DepthImage<'_> {
         );
         assert_eq!(cells.len() % cols, 0, "cells do not fill rows of {cols}");
         assert!(min_m != max_m, "depth range {min_m} to {max_m}");
-        assert!(self.categories.len() <= CATEGORY_COLOURS.len(), "no colour");
         let range_m = (f64::from(min_m), f64::from(max_m));
         let (map_width, map_height) = (cols * scale, cells.len() / cols * scale);
         let map_top = 2 * MARGIN_PX + LINE_PX;
@@ -118,12 +141,24 @@ impl DepthImage<'_> {
         canvas.text(MARGIN_PX, MARGIN_PX, self.title, &SHADES);
         for (i, cell) in cells.iter().enumerate() {
             let (left, top) = (MARGIN_PX + i % cols * scale, map_top + i / cols * scale);
-            let colour = match *cell {
-                ImageCell::Depth(depth_m) => step(f64::from(depth_m), range_m),
-                ImageCell::Category(category) => CATEGORIES + category as u8,
-            };
-            canvas.fill(left, top, scale, scale, colour);
+            match *cell {
+                ImageCell::Depth(depth_m) => {
+                    let colour = step(f64::from(depth_m), range_m);
+                    canvas.fill(left, top, scale, scale, colour);
+                }
+                ImageCell::Category(category) => {
+                    let pattern = self.pattern_in_map(category);
+                    let origin = (MARGIN_PX, map_top);
+                    tile(&mut canvas, origin, (left, top), scale, pattern, greys);
+                }
+            }
         }
+        // White cells end at a line.
+        let (left, top) = (MARGIN_PX - 1, map_top - 1);
+        canvas.fill(left, top, map_width + 2, 1, INK);
+        canvas.fill(left, top + map_height + 1, map_width + 2, 1, INK);
+        canvas.fill(left, top, 1, map_height + 2, INK);
+        canvas.fill(left + map_width + 1, top, 1, map_height + 2, INK);
         draw_bar(
             &mut canvas,
             bar_left,
@@ -133,16 +168,12 @@ impl DepthImage<'_> {
             self.unit,
         );
         for (category, text, left, top) in entries {
-            let (top, colour) = (legend_top + top, CATEGORIES + category as u8);
+            let top = legend_top + top;
             let sample_top = top + (LINE_PX - SAMPLE_PX) / 2;
             canvas.fill(left, sample_top, SAMPLE_PX, SAMPLE_PX, INK);
-            canvas.fill(
-                left + 1,
-                sample_top + 1,
-                SAMPLE_PX - 2,
-                SAMPLE_PX - 2,
-                colour,
-            );
+            let corner = (left + 1, sample_top + 1);
+            let pattern = self.categories[category].pattern;
+            tile(&mut canvas, corner, corner, SAMPLE_PX - 2, pattern, greys);
             canvas.text(left + SAMPLE_PX + SAMPLE_OFFSET_PX, top, &text, &SHADES);
         }
         canvas
@@ -152,7 +183,7 @@ impl DepthImage<'_> {
     fn legend(&self, width: usize) -> (Vec<(usize, String, usize, usize)>, usize) {
         let (mut left, mut top) = (MARGIN_PX, 0);
         let mut entries = Vec::new();
-        for (category, name) in self.categories.iter().enumerate() {
+        for (category, Category { name, .. }) in self.categories.iter().enumerate() {
             let is_this = |cell: &&ImageCell| **cell == ImageCell::Category(category);
             let count = self.cells.iter().filter(is_this).count();
             if count == 0 {
@@ -170,6 +201,24 @@ impl DepthImage<'_> {
             (entries, 0)
         } else {
             (entries, top + LEGEND_LINE_PX + MARGIN_PX / 2)
+        }
+    }
+}
+
+/// Fills a square at `corner` with a pattern that repeats from `origin`.
+fn tile(
+    canvas: &mut Canvas,
+    origin: (usize, usize),
+    (left, top): (usize, usize),
+    side: usize,
+    pattern: Pattern,
+    greys: &[u8],
+) {
+    for y in top..top + side {
+        for x in left..left + side {
+            let level = pattern.level(x - origin.0, y - origin.1);
+            let number = greys.binary_search(&level).expect("greys of all patterns");
+            canvas.fill(x, y, 1, 1, GREYS + number as u8);
         }
     }
 }
@@ -233,14 +282,14 @@ fn shade(i: usize) -> Rgb {
     [(PAPER_GREY + share * (INK_GREY - PAPER_GREY)).round() as u8; 3]
 }
 
-fn encode(file: &mut dyn Write, canvas: &Canvas) -> io::Result<()> {
+fn encode(file: &mut dyn Write, canvas: &Canvas, greys: &[u8]) -> io::Result<()> {
     let too_large = |_| io::Error::other("the picture is too large");
     let width = u32::try_from(canvas.width()).map_err(too_large)?;
     let height = u32::try_from(canvas.height()).map_err(too_large)?;
     let palette: Vec<u8> = (0..STEPS)
         .map(|i| scale_colour(f64::from(i) / f64::from(STEPS - 1)))
         .chain((0..SHADES.len()).map(shade))
-        .chain(CATEGORY_COLOURS)
+        .chain(greys.iter().map(|&grey| [grey; 3]))
         .flatten()
         .collect();
     let mut encoder = png::Encoder::new(file, width, height);
@@ -296,7 +345,7 @@ mod tests {
             cells: &cells,
             range_m: (10.0, 90.0),
             unit: "m",
-            categories: &["sky", "dark", "lost"],
+            categories: &[SKY, DARK, LOST],
             scale: 8,
         };
         map.write_png(&path).unwrap();
@@ -306,15 +355,56 @@ mod tests {
             pixels[(map_top + row * 8 + 4) * width + MARGIN_PX + col * 8 + 4]
         };
         let (near, far) = (scale_colour(0.0), scale_colour(1.0));
-        let [sky, dark, lost] = [0, 1, 2].map(|i| CATEGORY_COLOURS[i]);
-        assert_eq!(
-            [square(0, 0), square(0, 1), square(0, 2)],
-            [near, sky, lost]
-        );
+        let [sky, dark] = [SKY, DARK].map(|category| [category.pattern.level(0, 0); 3]);
+        assert_eq!([square(0, 0), square(0, 1)], [near, sky]);
         assert_eq!([square(1, 0), square(1, 1), square(1, 2)], [far, far, near]);
+        // A cell of 8 pixels has four whole tiles.
+        for (y, x) in (0..8).flat_map(|y| (0..8).map(move |x| (y, x))) {
+            let pixel = pixels[(map_top + y) * width + MARGIN_PX + 16 + x];
+            assert_eq!(pixel, [LOST.pattern.level(x, y); 3], "{x} {y}");
+        }
         // The legend shows what occurs, and nothing else.
         let legend = &pixels[(map_top + 4 * LINE_PX) * width..];
-        assert!(legend.contains(&sky) && legend.contains(&lost) && !legend.contains(&dark));
+        let ink = [LOST.pattern.level(1, 1); 3];
+        assert!(legend.contains(&sky) && legend.contains(&ink) && !legend.contains(&dark));
+    }
+
+    const SKY: Category<'_> = Category {
+        name: "sky",
+        pattern: Pattern::plain(250),
+    };
+    const DARK: Category<'_> = Category {
+        name: "dark",
+        pattern: Pattern::plain(7),
+    };
+    const LOST: Category<'_> = Category {
+        name: "lost",
+        pattern: Pattern::tile(240, 60, [b"....", b".##.", b".##.", b"...."]),
+    };
+
+    #[test]
+    fn cells_of_two_pixels_have_their_mean_grey_and_the_legend_has_the_tile() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("d.png");
+        let map = DepthImage {
+            title: "",
+            cols: 30,
+            cells: &[ImageCell::Category(0); 900],
+            range_m: (0.0, 1.0),
+            unit: "m",
+            categories: &[LOST],
+            scale: 2,
+        };
+        map.write_png(&path).unwrap();
+        let (width, _, pixels) = decode(&path);
+        let top = 2 * MARGIN_PX + LINE_PX;
+        let mean = [LOST.pattern.mean(); 3];
+        for y in 0..60 {
+            let row = &pixels[(top + y) * width + MARGIN_PX..][..60];
+            assert!(row.iter().all(|&pixel| pixel == mean));
+        }
+        let ink = [LOST.pattern.level(1, 1); 3];
+        assert!(pixels[(top + 60) * width..].contains(&ink));
     }
 
     #[test]
@@ -335,7 +425,7 @@ mod tests {
             cells: &cells,
             range_m: (10.0, 200.0),
             unit: "m",
-            categories: &["no guide"],
+            categories: &[DARK],
             scale: 8,
         };
         map.write_png(&path).unwrap();
@@ -373,7 +463,7 @@ mod tests {
             cells: &[ImageCell::Category(0)],
             range_m: (-2e6, 3e6),
             unit: "m",
-            categories: &[&long],
+            categories: &[Category { name: &long, ..SKY }],
             ..map
         };
         map.write_png(&path).unwrap();

@@ -20,7 +20,7 @@ use crate::report::{DepthImage, ImageCell, write_npy_u16};
 use crate::scene::{EyeSafety, Scene, Train};
 use crate::system::{
     DistanceLaw, EngineKind, Frame, FrameSettings, FrameSummary, NoDepth, PhaseTimes, PixelDepth,
-    ToleranceResult,
+    ToleranceResult, frame_scale_m,
 };
 
 /// What frame.json and drive.json say of an exposure alike, first of all.
@@ -296,30 +296,18 @@ fn depth_map(out: &Path, drawn: &FramePictures<'_>) -> Result<(), InputError> {
         })
         .collect();
     let map = DepthImage {
-        title: &format!("{mode} dToF depth, {} laser cycles", drawn.laser_cycles),
+        title: &format!("Depth, {mode}, {} laser cycles", drawn.laser_cycles),
         cols,
         cells: &cells,
-        range_m: depth_range(&cells),
+        range_m: frame_scale_m(
+            drawn
+                .macropixels
+                .iter()
+                .filter_map(|pixel| pixel.measured_m),
+        ),
         unit: "m",
-        categories: &NoDepth::ALL.map(NoDepth::name),
+        categories: &NoDepth::categories(),
         scale: (512 / rows.max(cols)).max(1),
     };
     map.write_png(&out.join("depth.png"))
-}
-
-/// Shortest and longest depth, a little apart even if all are the same.
-fn depth_range(cells: &[ImageCell]) -> (f32, f32) {
-    let known = || {
-        cells.iter().filter_map(|cell| match *cell {
-            ImageCell::Depth(depth_m) => Some(depth_m),
-            ImageCell::Category(_) => None,
-        })
-    };
-    let shortest = known().fold(f32::INFINITY, f32::min);
-    let longest = known().fold(f32::NEG_INFINITY, f32::max);
-    if shortest.is_finite() && longest.is_finite() {
-        (shortest.floor(), longest.ceil().max(shortest.floor() + 1.0))
-    } else {
-        (0.0, 1.0)
-    }
 }

@@ -17,6 +17,9 @@ pub enum Holds {
     Truth,
 }
 
+/// Parts of keys that say in which file they stand.
+const FOLDERS: [&str; 5] = ["sensor", "scene", "frame", "theory", "object"];
+
 /// A column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
@@ -38,11 +41,26 @@ impl Column {
         }
     }
 
-    /// Heading and unit, for an axis.
+    /// Words and unit, for an axis: `light illuminance (klux)` of `scene.light.illuminance_klux`.
     pub(crate) fn label(&self) -> String {
         match self.unit {
-            "" => self.name.clone(),
-            unit => format!("{} ({unit})", self.name),
+            "" => self.words(),
+            unit => format!("{} ({unit})", self.words()),
+        }
+    }
+
+    /// The heading in words, without its unit.
+    pub(crate) fn words(&self) -> String {
+        let parts = self.name.split('.').filter(|part| !FOLDERS.contains(part));
+        let words: Vec<&str> = parts.flat_map(|part| part.split('_')).collect();
+        let plain = |text: &str| text.to_lowercase().replace(['/', '²', '³', ' '], "");
+        let ends_in_unit = words
+            .last()
+            .is_some_and(|last| plain(last) == plain(self.unit));
+        let kept = words.len() - usize::from(ends_in_unit && words.len() > 1);
+        match words[..kept] {
+            ["p", ref of @ ..] => format!("probability of {}", of.join(" ")),
+            ref words => words.join(" "),
         }
     }
 }
@@ -171,6 +189,30 @@ mod tests {
             prop_assert!(!field.starts_with(['=', '@']));
             prop_assert!(!field.starts_with(['+', '-']) || field.parse::<f64>().is_ok());
             prop_assert!(!field.contains(',') || (field.starts_with('"') && field.ends_with('"')));
+        }
+    }
+
+    #[test]
+    fn headings_become_words_and_lose_their_unit() {
+        for (name, unit, label) in [
+            (
+                "scene.light.illuminance_klux",
+                "klux",
+                "light illuminance (klux)",
+            ),
+            (
+                "scene.lidar.pulse_energy_uj",
+                "uJ",
+                "lidar pulse energy (uJ)",
+            ),
+            ("scene.object.car.reflectivity", "", "car reflectivity"),
+            ("theory.range_m", "m", "range (m)"),
+            ("share_within_a_bin", "", "share within a bin"),
+            ("depths", "", "depths"),
+            ("p_detection", "", "probability of detection"),
+        ] {
+            let column = Column::new(name, unit, Holds::Number);
+            assert_eq!(column.label(), label);
         }
     }
 }

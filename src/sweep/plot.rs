@@ -52,7 +52,8 @@ impl Plot {
 pub struct Drawing<'a> {
     plot: &'a Plot,
     columns: [usize; 2],
-    series_column: Option<usize>,
+    /// Number of the column of series, and its words.
+    series_column: Option<(usize, String)>,
     x: Column,
     y: Column,
     is_log: bool,
@@ -145,6 +146,7 @@ impl<'a> Drawing<'a> {
         };
         let (x, y) = (number(&plot.x)?, number(&plot.y)?);
         let series_column = plot.series.as_deref().map(find).transpose()?;
+        let series_column = series_column.map(|column| (column, columns[column].label()));
         Ok(Drawing {
             plot,
             columns: [x, y],
@@ -165,7 +167,11 @@ impl<'a> Drawing<'a> {
         if !(x.is_finite() && y.is_finite()) {
             return;
         }
-        let name = match self.series_column.map(|column| &cells[column]) {
+        let name = match self
+            .series_column
+            .as_ref()
+            .map(|(column, _)| &cells[*column])
+        {
             None => String::new(),
             Some(TableCell::Number(x)) => x.to_string(),
             Some(other) => other.csv(),
@@ -186,7 +192,7 @@ impl<'a> Drawing<'a> {
     ///
     /// # Errors
     /// More series than a chart tells apart.
-    pub(crate) fn chart(self, study: &Study, option: &str) -> Result<Chart, InputError> {
+    pub(crate) fn chart(self, option: &str) -> Result<Chart, InputError> {
         if self.series.len() > MOST_SERIES {
             let series = self.plot.series.as_deref().unwrap_or_default();
             let message = format!(
@@ -207,12 +213,15 @@ impl<'a> Drawing<'a> {
                 Axis::linear(column.label())
             }
         };
-        let title = format!("{}: {} over {}", study.name, self.y.name, self.x.name);
+        let mut title = format!("{} over {}", self.y.words(), self.x.words());
+        if let Some(first) = title.get_mut(..1) {
+            first.make_ascii_uppercase();
+        }
         let axes = (axis(&self.x, self.is_log), axis(&self.y, y_is_log));
         let mut chart = Chart::new(title, axes.0, axes.1);
         for (name, at) in &self.series {
-            let label = match &self.plot.series {
-                Some(series) => format!("{series} = {name}"),
+            let label = match &self.series_column {
+                Some((_, series)) => format!("{series} = {name}"),
                 None => String::new(),
             };
             let rows: u64 = at.values().map(|seen| seen.count).sum();
@@ -255,7 +264,7 @@ mod tests {
             );
             drawing.add_row(&cells);
         }
-        let chart = drawing.chart(&study, "--plot").unwrap();
+        let chart = drawing.chart("--plot").unwrap();
         let series: Vec<_> = chart
             .series
             .iter()
@@ -269,6 +278,6 @@ mod tests {
                 (Style::Whiskers, &whiskers)
             ]
         );
-        assert_eq!(chart.series[0].name, "theory.reflectivity = 0.5");
+        assert_eq!(chart.series[0].name, "reflectivity = 0.5");
     }
 }

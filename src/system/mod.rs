@@ -2,11 +2,13 @@
 
 mod aim;
 mod calibrate;
+mod depth_scale;
 mod distance;
 mod drive;
 mod error;
 mod frame;
 mod light;
+mod no_depth_pattern;
 pub mod pareto;
 mod pixel;
 mod policy;
@@ -27,6 +29,7 @@ mod tolerance;
 mod worlds;
 
 pub use calibrate::{BinCalibration, BinSweepError, Sweep, calibrate};
+pub use depth_scale::{drive_scale_m, frame_scale_m};
 pub use distance::DistanceLaw;
 pub use drive::{
     DriveFrame, DriveReuse, DriveSettings, DriveSimulation, FrameClock, FrameTimes, Noise,

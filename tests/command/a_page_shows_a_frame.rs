@@ -147,20 +147,19 @@ fn decoded(text: &str) -> String {
     String::from_utf8(bytes).unwrap()
 }
 
-#[test]
-fn a_browser_shows_the_page_and_follows_click_and_keys() {
+/// What a script saw that runs at the end of a page in a browser, and that nothing went wrong; `None` without a browser.
+pub(super) fn seen_in_a_browser(page: &str, script: &str) -> Option<Value> {
     let Some(browser) = browser() else {
         eprintln!("SKIPPED: no chromium here, so the page is not opened; install chromium");
-        return;
+        return None;
     };
     let dir = tempfile::tempdir().unwrap();
-    let (page, frame) = taken(dir.path());
     let (head, rest) = page.split_once("<head>").unwrap();
     let (body, end) = rest.rsplit_once("</body>").unwrap();
     let file = dir.path().join("watched.html");
     std::fs::write(
         &file,
-        format!("{head}<head>{WATCHES}{body}{USES}</body>{end}"),
+        format!("{head}<head>{WATCHES}{body}{script}</body>{end}"),
     )
     .unwrap();
     let profile = dir.path().join("profile");
@@ -188,6 +187,16 @@ fn a_browser_shows_the_page_and_follows_click_and_keys() {
     let saw: Value = serde_json::from_str(&decoded(saw.split(':').next().unwrap())).unwrap();
     assert_eq!(saw["bad"], serde_json::json!([]), "{saw}");
     assert_eq!(saw["ready"], "yes");
+    Some(saw)
+}
+
+#[test]
+fn a_browser_shows_the_page_and_follows_click_and_keys() {
+    let dir = tempfile::tempdir().unwrap();
+    let (page, frame) = taken(dir.path());
+    let Some(saw) = seen_in_a_browser(&page, USES) else {
+        return;
+    };
     let title = saw["title"].as_str().unwrap();
     assert!(
         title.starts_with("Frame of ") && title.ends_with("it's <b>.toml"),

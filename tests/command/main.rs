@@ -38,6 +38,7 @@ mod mismatch_replays;
 mod no_file_blocks_a_command;
 mod one_window_for_all;
 mod photons_reach_any_chip;
+mod pictures_agree;
 mod probes_keep_their_first_hits;
 #[cfg(unix)]
 mod progress_shows_on_a_terminal;
@@ -58,6 +59,7 @@ mod the_book_lists_every_key;
 mod the_book_reads_plainly;
 mod the_book_runs;
 mod the_command_explains_itself;
+mod the_readme_runs;
 mod the_same_everywhere;
 mod wave_replays_a_cycle;
 #[cfg(unix)]

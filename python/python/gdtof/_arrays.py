@@ -9,9 +9,13 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ._gdtof import REASONS
 from .errors import InputError
 
 Map: TypeAlias = Literal["depth", "guide", "truth", "peak", "error", "confidence", "reason", "counts"]
+
+REASON_NAMES = ("depth", *REASONS)
+"""By :class:`Reason`."""
 
 SPEED_OF_LIGHT_M_PER_S = 299_792_458.0
 
@@ -40,14 +44,8 @@ class Reason(IntEnum):
 
 
 def reason_name(reason: Reason) -> str:
-    """As the tables of `gdtof frame` have it."""
-    words = {
-        Reason.DEPTH: "depth",
-        Reason.SPADS_OFF: "SPADs off",
-        Reason.OUTSIDE_WINDOW: "target outside window",
-        Reason.BEHIND_LIDAR: "echo from behind the lidar",
-    }
-    return words.get(reason, reason.name.lower().replace("_", " "))
+    """As the tables and pictures of `gdtof frame` have it."""
+    return REASON_NAMES[reason]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

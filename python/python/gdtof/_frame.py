@@ -45,18 +45,36 @@ class Maps(FrameArrays):
     """
 
     def plot(
-        self, maps: Map | Sequence[Map] = ("depth", "guide", "truth", "reason"), title: str | None = None
+        self,
+        maps: Map | Sequence[Map] = ("depth", "truth", "guide", "error"),
+        title: str | None = None,
+        *,
+        show: bool = True,
     ) -> Figure:
-        """Maps side by side with matplotlib; distances share their colours."""
+        """Maps side by side with matplotlib.
+
+        Distances have the colours of depth.png. Macropixels without a depth have the pattern of their reason, which the legend names. In a script a
+        window opens, as by ``matplotlib.pyplot.show``.
+
+        Parameters
+        ----------
+        maps
+            One map, or up to eight: depth, guide, truth, peak, error, confidence, reason, counts.
+        title
+            Above all maps.
+        show
+            Open a window. Without one the figure is only returned, as it is where matplotlib has no windows (`Agg`, notebooks).
+        """
         from ._plot import plot_maps
 
-        return plot_maps(self, [maps] if isinstance(maps, str) else list(maps), title)
+        return plot_maps(self, [maps] if isinstance(maps, str) else list(maps), title, show)
 
-    def plot_histogram(self, row: int, col: int, ax: Axes | None = None) -> Axes:
-        """A macropixel's histogram over distance, with the truth, the guide's estimate and the depth."""
+    def plot_histogram(self, row: int, col: int, ax: Axes | None = None, *, show: bool = True) -> Axes:
+        """A macropixel's histogram over distance, with the truth, the guide's estimate and the depth; shown as by :meth:`plot`, if `ax`
+        is not yours."""
         from ._plot import plot_histogram
 
-        return plot_histogram(self, row, col, ax)
+        return plot_histogram(self, row, col, ax, show)
 
     def _described(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """What a dataset says of it besides its arrays: attributes, and coordinates without dimensions."""

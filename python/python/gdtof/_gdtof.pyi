@@ -10,6 +10,8 @@ from typing_extensions import Unpack
 from ._keys import SceneName, SensorKeys, SensorName
 
 __all__ = [
+    "DEPTH_COLOURS",
+    "PATTERNS",
     "REASONS",
     "Drive",
     "Guide",
@@ -20,6 +22,7 @@ __all__ = [
     "__version__",
     "bin_edges",
     "confidence",
+    "depth_scale_m",
     "detector_agreement",
     "detector_checked",
     "detector_crosstalk",
@@ -43,6 +46,8 @@ __all__ = [
 ]
 
 __version__: str
+DEPTH_COLOURS: tuple[tuple[int, int, int], ...]
+PATTERNS: tuple[tuple[tuple[int, int, int, int], ...], ...]
 REASONS: tuple[str, ...]
 
 @final
@@ -271,6 +276,7 @@ def starts_for(
 def theory(
     name: str, words: Sequence[str], columns: Sequence[NDArray[np.float64]]
 ) -> NDArray[np.float64]: ...
+def depth_scale_m(depths_m: Sequence[float], /) -> tuple[float, float]: ...
 def confidence(
     histograms: NDArray[np.uint32], pulse_sigma_bins: float, laser_cycles: int
 ) -> NDArray[np.float64]: ...

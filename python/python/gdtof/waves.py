@@ -15,6 +15,7 @@ from .errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["Signal", "Waveform", "read_vcd"]
 
@@ -76,17 +77,20 @@ class Waveform:
         span_ns: tuple[float, float],
         origin_fs: int = 0,
         ax: Axes | None = None,
+        *,
+        show: bool = True,
     ) -> Axes:
         """Signals below each other with matplotlib, from and to a time in ns, counted from `origin_fs`.
 
-        Of a bus it is shown where it is not 0; unknown is half way.
+        Of a bus it is shown where it is not 0; unknown is half way. In a script a window opens, unless `show` is false or `ax` is yours.
         """
-        from ._plot import _pyplot
+        from ._plot import show_figure
 
+        figure: Figure | None = None
         if ax is None:
-            plt = _pyplot()
+            import matplotlib.pyplot as plt
+
             figure, ax = plt.subplots(figsize=(9.0, 0.5 + 0.6 * len(names)), layout="constrained")
-            plt.close(figure)
         assert ax is not None
         ends_fs = [origin_fs + round(1e6 * ns) for ns in span_ns]
         for place, name in enumerate(reversed(names)):
@@ -98,7 +102,9 @@ class Waveform:
             ax.step([1e-6 * (time - origin_fs) for time in times], levels, where="post", linewidth=1)
         ax.set_yticks([place + 0.35 for place, _ in enumerate(names)], list(reversed(names)))
         ax.set_xlim(*span_ns)
-        ax.set_xlabel("ns")
+        ax.set_xlabel("time (ns)")
+        if figure is not None:
+            show_figure(figure, show)
         return ax
 
 

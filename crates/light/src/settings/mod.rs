@@ -11,6 +11,7 @@
 mod declare;
 mod document;
 mod key;
+mod notes;
 mod print;
 mod quantity;
 mod schema;
@@ -19,6 +20,7 @@ pub use crate::{keys, words};
 pub use declare::{Setting, Settings, help};
 pub use document::{Document, Fault};
 pub use key::{Key, Range};
+pub use notes::Notes;
 pub use print::Section;
 pub use print::commented;
 pub use schema::schema;

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use toml::{Table, Value};
 
 use super::key::Key;
+use super::notes::{Notes, path};
 
 /// A section of a settings file.
 #[derive(Debug, Clone, Copy)]
@@ -26,16 +27,17 @@ impl Section {
 
 /// All of `values`, by `sections`, every key with what it is, its unit, range and source. What a key is where a file
 /// leaves it out is added where that is another value (`left_out` has these). A list gets its keys explained once, before
-/// its items.
-pub fn commented(sections: &[Section], values: &Table, left_out: &Table) -> String {
+/// its items. `notes` add why a value was chosen.
+pub fn commented(sections: &[Section], values: &Table, left_out: &Table, notes: &Notes) -> String {
     let mut text = String::new();
+    write_note(&mut text, "", notes.at(""));
     for section in sections {
         if !text.is_empty() {
             text.push('\n');
         }
         let _ = writeln!(text, "# {}.", section.what);
         if section.name.is_empty() {
-            write_keys(&mut text, section.keys, values, left_out);
+            write_keys(&mut text, section, values, left_out, notes);
             continue;
         }
         let nothing = Table::new();
@@ -44,10 +46,15 @@ pub fn commented(sections: &[Section], values: &Table, left_out: &Table) -> Stri
                 for key in section.keys {
                     let _ = writeln!(text, "#   {}: {}", key.name, explained(key));
                 }
-                for item in items.iter().filter_map(Value::as_table) {
-                    let _ = writeln!(text, "\n[[{}]]", section.name);
+                for (number, item) in items.iter().filter_map(Value::as_table).enumerate() {
+                    let place = path(section.name, &number.to_string());
+                    text.push('\n');
+                    write_note(&mut text, "", notes.at(&place));
+                    let _ = writeln!(text, "[[{}]]", section.name);
                     for key in section.keys {
                         if let Some(value) = item.get(key.name) {
+                            let note = notes.of_value(&path(&place, key.name), value);
+                            write_note(&mut text, WHY, note);
                             let _ = writeln!(text, "{} = {value}", key.name);
                         }
                     }
@@ -55,8 +62,10 @@ pub fn commented(sections: &[Section], values: &Table, left_out: &Table) -> Stri
             }
             Some(Value::Table(table)) => {
                 let left_out = left_out.get(section.name).and_then(Value::as_table);
+                write_note(&mut text, WHY, notes.at(section.name));
                 let _ = writeln!(text, "[{}]", section.name);
-                write_keys(&mut text, section.keys, table, left_out.unwrap_or(&nothing));
+                let left_out = left_out.unwrap_or(&nothing);
+                write_keys(&mut text, section, table, left_out, notes);
             }
             _ => {}
         }
@@ -64,8 +73,24 @@ pub fn commented(sections: &[Section], values: &Table, left_out: &Table) -> Stri
     text
 }
 
-fn write_keys(text: &mut String, keys: &[Key], values: &Table, left_out: &Table) {
-    for key in keys {
+/// Before a reason.
+const WHY: &str = "Why: ";
+
+fn write_note(text: &mut String, before: &str, note: Option<&str>) {
+    if let Some(note) = note {
+        let end = if note.ends_with('.') { "" } else { "." };
+        let _ = writeln!(text, "# {before}{note}{end}");
+    }
+}
+
+fn write_keys(
+    text: &mut String,
+    section: &Section,
+    values: &Table,
+    left_out: &Table,
+    notes: &Notes,
+) {
+    for key in section.keys {
         let Some(value) = values.get(key.name) else {
             continue;
         };
@@ -73,7 +98,10 @@ fn write_keys(text: &mut String, keys: &[Key], values: &Table, left_out: &Table)
         if let Some(other) = left_out.get(key.name).filter(|other| *other != value) {
             let _ = write!(text, " {other} where a file leaves it out.");
         }
-        let _ = writeln!(text, "\n{} = {value}", key.name);
+        text.push('\n');
+        let note = notes.of_value(&path(section.name, key.name), value);
+        write_note(text, WHY, note);
+        let _ = writeln!(text, "{} = {value}", key.name);
     }
 }
 

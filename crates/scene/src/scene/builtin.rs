@@ -1,7 +1,7 @@
 //! The built-in scenes, by name: the street, the warehouse, and what the demonstrator met (thesis 6.4.1).
 
 use super::settings::Scene;
-use crate::settings::Document;
+use crate::settings::{Document, Notes};
 
 /// Names, what they show, and their files.
 const SCENES: [(&str, &str, &str); 8] = [
@@ -60,6 +60,12 @@ impl Scene {
         Some(Document::parse(source, text).expect("the built-in scenes are tested"))
     }
 
+    /// Why the values of a built-in scene were chosen; `None` if there is none of this name.
+    pub fn built_in_notes(name: &str) -> Option<Notes> {
+        let (_, _, text) = SCENES.iter().find(|(known, ..)| *known == name)?;
+        Some(Notes::read(text, Scene::named(name)?.table()))
+    }
+
     /// A built-in scene; `None` if there is none of this name.
     pub fn named(name: &str) -> Option<Self> {
         let document = Scene::built_in_document(name)?;
@@ -78,11 +84,26 @@ mod tests {
             let scene = Scene::named(name).unwrap();
             assert!(!shows.is_empty());
             assert_eq!(Scene::parse(name, &scene.commented()).unwrap(), scene);
+            let text = scene.commented_with(&Scene::built_in_notes(name).unwrap());
+            assert_eq!(Scene::parse(name, &text).unwrap(), scene, "{name}");
             if !["street", "warehouse"].contains(&name) {
                 assert_eq!(scene.lidar, Lidar::demonstrator(), "{name}");
             }
         }
         assert!(Scene::named("strret").is_none());
+    }
+
+    /// Every comment of the files is printed.
+    #[test]
+    fn no_comment_is_lost() {
+        for (name, _, file) in SCENES {
+            let scene = Scene::named(name).unwrap();
+            let text = scene.commented_with(&Scene::built_in_notes(name).unwrap());
+            let comments = file.lines().filter_map(|line| line.split_once('#'));
+            for (_, comment) in comments {
+                assert!(text.contains(comment.trim()), "{name}: {comment}");
+            }
+        }
     }
 
     /// Macropixels of HSLIDAR's array that see an object at a time, and how far it is.

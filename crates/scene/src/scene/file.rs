@@ -14,7 +14,7 @@ use super::rules::{check_object, check_rig, check_stereo};
 use super::settings::{Lidar, Light, Scene, Stereo};
 use super::words::FilterWord;
 use crate::files::{InputError, nearest};
-use crate::settings::{Document, Fault, Key, Range, Section, Settings, commented, schema};
+use crate::settings::{Document, Fault, Key, Notes, Range, Section, Settings, commented, schema};
 
 impl Scene {
     /// The built-in street, from 15 to 180 m, 50 klux.
@@ -130,8 +130,13 @@ impl Scene {
 
     /// The scene as a commented file, which [`Scene::parse`] reads back.
     pub fn commented(&self) -> String {
-        let left_out = Scene::default();
-        commented(Scene::SECTIONS, &self.table(), &left_out.table())
+        self.commented_with(&Notes::default())
+    }
+
+    /// As [`Scene::commented`], with reasons for values, which [`Scene::built_in_notes`] has.
+    pub fn commented_with(&self, notes: &Notes) -> String {
+        let left_out = Scene::default().table();
+        commented(Scene::SECTIONS, &self.table(), &left_out, notes)
     }
 
     /// The JSON schema of a scene file.

@@ -12,7 +12,7 @@ use super::timing::library_files::{library_files, library_setting};
 use super::timing::silicon::Silicon;
 use crate::files::{InputError, placed};
 use crate::photon::{SIDES, count_bits};
-use crate::settings::{Document, Fault, Key, Section, Settings, commented, schema};
+use crate::settings::{Document, Fault, Key, Notes, Section, Settings, commented, schema};
 
 /// What is impossible about a sensor, and what would be possible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -276,8 +276,18 @@ impl SensorConfig {
 
     /// The configuration as a commented file, which [`SensorConfig::parse`] reads back.
     pub fn commented(&self) -> String {
-        let table = |config: &Self| toml::Table::try_from(config).expect("numbers and words");
-        commented(&[Self::SECTION], &table(self), &table(&Self::default()))
+        self.commented_with(&Notes::default())
+    }
+
+    /// As [`SensorConfig::commented`], with reasons for values, which [`Sensor::built_in_notes`](super::Sensor::built_in_notes) has.
+    pub fn commented_with(&self, notes: &Notes) -> String {
+        let left_out = Self::default().table();
+        commented(&[Self::SECTION], &self.table(), &left_out, notes)
+    }
+
+    /// All values as a TOML table.
+    pub(super) fn table(&self) -> toml::Table {
+        toml::Table::try_from(self).expect("numbers and words")
     }
 
     /// The JSON schema of a sensor file.

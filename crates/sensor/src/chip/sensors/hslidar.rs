@@ -21,6 +21,46 @@ use crate::chip::config::{PCounter, SensorConfig, Tdc};
 /// The fastest CLK that the chip takes (thesis 6.3.1), Hz. The model's gates are those of a faster library.
 pub const HSLIDAR_MOST_HZ: f64 = 200e6;
 
+/// What it is.
+pub(super) const HEAD: &str = "HSLIDAR, the chip of the thesis's demonstrator (4.9, 6.3, Tables 10 and 11), in one of its modes";
+
+/// Why the main values of the clocked mode were chosen.
+pub(super) const WHY: &[(&str, &str)] = &[
+    ("rows", "the thesis's array of 64x32 (Table 11)"),
+    ("cols", "the thesis's array of 64x32 (Table 11)"),
+    ("counter_bits", "the thesis's P-counter (Fig. 51b)"),
+    (
+        "tdc",
+        "of this mode the thesis says that a bin is a CLK period; that all photons of a bin count is chosen",
+    ),
+    (
+        "step_periods",
+        "windows step by half their length (Table 10)",
+    ),
+    ("bins", "a window of 40 ns (6 m)"),
+    (
+        "clk_hz",
+        "the fastest CLK that the thesis's chip takes (6.3.1)",
+    ),
+];
+
+/// Why those of the delay-line mode were chosen.
+pub(super) const WHY_DELAY_LINE: &[(&str, &str)] = &[
+    ("rows", "the thesis's array of 64x32 (Table 11)"),
+    ("cols", "the thesis's array of 64x32 (Table 11)"),
+    ("counter_bits", "the thesis's P-counter (Fig. 51b)"),
+    (
+        "tdc",
+        "bins are the elements of delay lines, 2.6 ns on average (Fig. 91)",
+    ),
+    ("step_periods", "windows step by a CLK period (Table 10)"),
+    ("clk_hz", "windows step by 12.5 ns, or 1.875 m (Table 14)"),
+    (
+        "clk_skew_ps",
+        "Fig. 90 shows from left to right that CLK comes later, without a scale",
+    ),
+];
+
 /// The chip in its clocked, guided mode, in typical silicon.
 pub fn hslidar() -> Sensor {
     let config = SensorConfig {

@@ -18,6 +18,8 @@ pub use quantic4x4::quantic4x4;
 pub use sensor::Sensor;
 pub use vcsel_flash::vcsel_flash;
 
+use crate::settings::Notes;
+
 /// A chip's name, and what makes its [`Sensor`].
 pub type Chip = (&'static str, fn() -> Sensor);
 
@@ -34,6 +36,18 @@ impl Sensor {
     pub fn named(name: &str) -> Option<Self> {
         let chip = CHIPS.iter().find(|(known, _)| *known == name);
         chip.map(|(_, chip)| chip())
+    }
+
+    /// Why the main values of the chip of this name, one of [`CHIPS`], were chosen.
+    pub fn built_in_notes(name: &str) -> Option<Notes> {
+        let (head, keys) = match name {
+            "quantic4x4" => (quantic4x4::HEAD, quantic4x4::WHY),
+            "vcsel_flash" => (vcsel_flash::HEAD, vcsel_flash::WHY),
+            "hslidar" => (hslidar::HEAD, hslidar::WHY),
+            "hslidar_delay_line" => (hslidar::HEAD, hslidar::WHY_DELAY_LINE),
+            _ => return None,
+        };
+        Some(Notes::of_keys(head, keys, Sensor::named(name)?.table()))
     }
 }
 
@@ -105,7 +119,14 @@ mod tests {
         for (name, chip) in CHIPS {
             assert!(chip().check().is_ok(), "{name}");
             assert_eq!(Sensor::named(name), Some(chip()));
+            // The file with reasons reads back unchanged, and has them all.
+            let notes = Sensor::built_in_notes(name).unwrap();
+            let text = chip().commented_with(&notes);
+            assert_eq!(SensorConfig::parse(name, &text).unwrap(), *chip(), "{name}");
+            let (_, keys) = text.split_once("# A sensor").unwrap();
+            assert!(keys.matches("# Why: ").count() >= 5, "{name}");
         }
+        assert!(Sensor::built_in_notes("other").is_none());
         assert!(Sensor::named("other").is_none());
     }
 
