@@ -102,6 +102,7 @@ impl DepthImage<'_> {
             pattern
         }
     }
+
     /// Every grey that categories have, in map and legend.
     fn greys(&self) -> Vec<u8> {
         let patterns = self.categories.iter().map(|category| category.pattern);

@@ -111,7 +111,8 @@ fn a_full_disk_is_one_sentence_and_changes_nothing() {
             &[(false, 0), (false, 4), (true, 0), (true, 4)]
         };
         for &(has_older, blocks) in moments {
-            if has_older {
+            // A run that fails leaves the older set, so one serves both.
+            if (has_older, blocks) == (true, 0) {
                 let run = gdtof(here, &words).output().unwrap();
                 assert!(run.status.success(), "{words:?}: {run:?}");
             }

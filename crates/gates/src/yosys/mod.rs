@@ -174,6 +174,7 @@ impl Module {
         design.build(top)
     }
 }
+
 impl Design {
     fn from_json(text: &str) -> Result<Self, YosysError> {
         if text.len() > MOST_BYTES {
@@ -181,6 +182,7 @@ impl Design {
         }
         serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(JsonFault::new(&e)))
     }
+
     /// The module called `top`, or else the one that is marked as the top.
     fn build(&self, top: Option<&str>) -> Result<Arc<Module>, YosysError> {
         let modules = &self.modules.0;

@@ -251,6 +251,7 @@ proptest! {
         prop_assert!(worst < allowed, "{worst} with {steps} steps");
         prop_assert!(steps <= most && response.steps(&light, Steps::Coarse) <= steps);
     }
+
     /// Lights side by side go in the steps that one of them needs, and single ones in their own.
     #[test]
     fn lights_side_by_side_are_as_each_alone(
