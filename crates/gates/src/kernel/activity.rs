@@ -64,7 +64,7 @@ struct State {
 /// let mut kernel = Kernel::new(&netlist, &timing);
 /// kernel.run(&mut Stimulus::new(drives), Time::from_ns(3), &mut activity)?;
 /// // Z comes from X to 1, falls and rises.
-/// assert_eq!(activity.until(kernel.now())[z.index()].toggles, 2);
+/// assert_eq!(activity.net_activity(kernel.now())[z.index()].toggles, 2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]

@@ -112,7 +112,7 @@ pub(super) struct MeasuredSlack {
 /// let low = [d, ck, r].map(|net| Drive::new(Time::ZERO, net, false));
 /// let rises = [(9_999, d), (10_000, ck)];
 /// let rises = rises.map(|(ps, net)| Drive::new(Time::from_ps(ps), net, true));
-/// let mut stimulus = Stimulus::new(low).with(rises);
+/// let mut stimulus = Stimulus::new(low).with_drives(rises);
 /// let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ);
 /// Kernel::new(&netlist, &timing).run(&mut stimulus, Time::from_ns(20), &mut checks)?;
 ///

@@ -42,7 +42,7 @@ impl<W: Read + Write + Seek> FstWriter<W> {
     /// use femtogate::kernel::{Drive, Kernel, Stimulus};
     /// use femtogate::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
     /// use femtogate::units::Time;
-    /// use femtogate::waves::{FstWriter, Selection};
+    /// use femtogate::waves::{FstWriter, WaveSelection};
     ///
     /// let mut m = ModuleBuilder::new("top");
     /// let (a, z) = (m.input("A"), m.output("Z"));
@@ -51,7 +51,7 @@ impl<W: Read + Write + Seek> FstWriter<W> {
     /// let a = netlist.net("A").unwrap();
     /// let timing = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
     /// let file = Cursor::new(Vec::new()); // or a `File` that can be read, too
-    /// let mut waves = FstWriter::new(file, &netlist, &Selection::all())?;
+    /// let mut waves = FstWriter::new(file, &netlist, &WaveSelection::all())?;
     /// let mut kernel = Kernel::new(&netlist, &timing);
     /// let mut stimulus = Stimulus::new([Drive::new(Time::from_ns(1), a, true)]);
     /// kernel.run(&mut stimulus, Time::from_ns(2), &mut waves)?;

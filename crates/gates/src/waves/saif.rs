@@ -43,7 +43,7 @@ use crate::units::Time;
 /// let end = Time::from_ns(2);
 /// Kernel::new(&netlist, &timing).run(&mut stimulus, end, &mut activity)?;
 /// let mut saif = Vec::new();
-/// write_saif(&mut saif, &netlist, &activity.until(end), end, false, Origin::default())?;
+/// write_saif(&mut saif, &netlist, &activity.net_activity(end), end, false, Origin::default())?;
 /// assert!(String::from_utf8(saif)?.contains("(DURATION 2000000)"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

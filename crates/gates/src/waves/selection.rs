@@ -25,7 +25,7 @@ use crate::netlist::Netlist;
 /// let text = String::from_utf8(whole.finish(Time::from_ns(1))?)?;
 /// assert!(text.contains("$scope module top $end"));
 ///
-/// let nowhere = WaveSelection::all().below("nowhere");
+/// let nowhere = WaveSelection::all().with_scope("nowhere");
 /// assert!(VcdWriter::new(Vec::new(), &netlist, &nowhere).is_err());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
