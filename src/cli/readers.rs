@@ -19,7 +19,7 @@ use crate::page::Page;
 use crate::ranging::{Calibration, tmf8820};
 use crate::request::read_calibration;
 use crate::scene::{Mesh, Scene};
-use crate::sdf::{Sdf, annotate, oddities};
+use crate::sdf::{Sdf, annotate, suspect_delays};
 use crate::settings::Document;
 use crate::stimulus::recording::{read_events, read_starts};
 use crate::sweep::{Study, study_of};
@@ -78,7 +78,7 @@ pub const READERS: &[(&str, Reader)] = &[
         let text = text(path)?;
         let sdf = Sdf::parse("SDF", &text).map_err(|e| e.to_string())?;
         let (netlist, timing) = &*MACROPIXEL;
-        oddities(&sdf, SENSOR.corner);
+        suspect_delays(&sdf, SENSOR.corner);
         error_text(annotate(&mut timing.clone(), netlist, &sdf, SENSOR.corner))
     }),
     ("liberty", |path| {

@@ -14,7 +14,7 @@ use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::{Corner, Netlist, Timing};
 use crate::sdf::{
     Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, SkippedEntry, annotate,
-    oddities, write_library_sdf, write_sdf,
+    suspect_delays, write_library_sdf, write_sdf,
 };
 use crate::units::Time;
 
@@ -154,8 +154,8 @@ pub(super) fn annotated_timing(
             why_unused(&sdf, config.corner, &result),
         ));
     }
-    for oddity in oddities(&sdf, config.corner) {
-        note(format_args!("{}:{}: {oddity}", sdf.source, oddity.line()));
+    for suspect in suspect_delays(&sdf, config.corner) {
+        note(format_args!("{}:{}: {suspect}", sdf.source, suspect.line()));
     }
     let skipped_line = |skipped: &SkippedEntry| {
         format!(

@@ -115,6 +115,7 @@ impl DepthImage<'_> {
         assert!(greys.len() <= MOST_GREYS, "too many greys");
         greys
     }
+
     fn draw(&self, greys: &[u8]) -> Canvas {
         let &DepthImage {
             cols, cells, scale, ..

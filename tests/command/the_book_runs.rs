@@ -5,6 +5,8 @@ use std::process::Command;
 
 use rayon::prelude::*;
 
+use super::the_readme_runs::blocks;
+
 fn book() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src")
 }
@@ -16,21 +18,6 @@ fn chapters() -> Vec<String> {
     links
         .map(|link| link.trim_end_matches(')').to_owned())
         .collect()
-}
-
-/// What stands between lines of ```sh and ```.
-fn commands(text: &str) -> String {
-    let mut in_block = false;
-    let mut commands = String::new();
-    for line in text.lines() {
-        match (in_block, line) {
-            (false, "```sh") => in_block = true,
-            (true, "```") => in_block = false,
-            (true, line) => commands += &format!("{line}\n"),
-            (false, _) => {}
-        }
-    }
-    commands
 }
 
 /// Counts of `replay` and laser cycles of `wave` below a folder in which nothing is counted: they show a reader nothing.
@@ -98,7 +85,12 @@ fn every_command_runs() {
                 }
             }
             let output = Command::new("bash")
-                .args(["-euo", "pipefail", "-c", &commands(&text)])
+                .args([
+                    "-euo",
+                    "pipefail",
+                    "-c",
+                    &blocks(&text, "sh").concat().join("\n"),
+                ])
                 .env("PATH", &path)
                 .current_dir(empty.path())
                 .output()

@@ -33,7 +33,7 @@ fn readme() -> String {
 }
 
 /// Lines between ```KIND and ```, block after block.
-fn blocks(text: &str, kind: &str) -> Vec<Vec<String>> {
+pub fn blocks(text: &str, kind: &str) -> Vec<Vec<String>> {
     let mut blocks: Vec<Vec<String>> = Vec::new();
     let (begin, mut is_inside) = (format!("```{kind}"), false);
     for line in text.lines() {

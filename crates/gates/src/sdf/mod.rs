@@ -42,9 +42,9 @@
 mod annotate;
 mod entries;
 mod limits;
-mod oddities;
 mod parser;
 mod stages;
+mod suspect_delays;
 #[cfg(test)]
 mod tests;
 mod tokens;
@@ -53,7 +53,7 @@ mod writer;
 
 pub use annotate::{Annotation, annotate};
 pub(super) use limits::checks_of;
-pub use oddities::{Oddity, oddities};
+pub use suspect_delays::{SuspectDelay, suspect_delays};
 pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_library_sdf, write_sdf};
 
 use std::borrow::Cow;

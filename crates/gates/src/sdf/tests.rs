@@ -271,7 +271,7 @@ fn what_is_not_modelled_is_counted() {
 
 /// One delay of four is zero (an increment of zero is none), and a cell's arc is given again by two entries.
 #[test]
-fn oddities_are_counted() {
+fn suspect_delays_are_counted() {
     let cell = |path: &str, delays: &str| {
         format!("(CELL (CELLTYPE \"INV\") (INSTANCE {path}) (DELAY {delays}))\n")
     };
@@ -286,18 +286,18 @@ fn oddities_are_counted() {
         ]
         .concat(),
     );
-    let found = oddities(&Sdf::parse("a.sdf", &text).unwrap(), Corner::Typ);
+    let found = suspect_delays(&Sdf::parse("a.sdf", &text).unwrap(), Corner::Typ);
     let first = text
         .lines()
         .position(|line| line.contains("INSTANCE a"))
         .unwrap()
         + 1;
-    let zeros = Oddity::Zeros {
+    let zeros = SuspectDelay::Zeros {
         zeros: 1,
         arcs: 4,
         line: first,
     };
-    let Oddity::Twice {
+    let SuspectDelay::Twice {
         before,
         entries,
         line,

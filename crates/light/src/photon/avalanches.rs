@@ -73,7 +73,7 @@ impl<'a> Avalanches<'a> {
         }
     }
 
-    /// SPADs whose photons are known from `time` on. `breeding` are the photons before it that trigger others, since
+    /// SPADs whose photons are known from `time` on. `triggering` are the photons before it that trigger others, since
     /// [`SpadModel::reach`] at least.
     pub(crate) fn known_from(
         model: &'a SpadModel,
@@ -81,14 +81,14 @@ impl<'a> Avalanches<'a> {
         pixel: u32,
         dead_times: &'a [Time],
         time: Time,
-        breeding: impl Iterator<Item = Photon>,
+        triggering: impl Iterator<Item = Photon>,
     ) -> Self {
         let mut avalanches = Self::in_the_dark(model, key, pixel, dead_times);
         for (spad, until) in (0..).zip(&mut avalanches.blind_until) {
             *until = time - Time::from_fs(1) + model.dead_time_among(dead_times, spad);
         }
         avalanches.unknown = u64::MAX;
-        for photon in breeding {
+        for photon in triggering {
             avalanches.queue_children(photon, false);
         }
         avalanches
@@ -187,7 +187,11 @@ impl<'a> Avalanches<'a> {
         wanted_from: Time,
         edges: &mut Vec<SpadEvent>,
     ) -> Result<(), Unknown> {
-        let Photon { time, spad, breeds } = photon;
+        let Photon {
+            time,
+            spad,
+            triggers,
+        } = photon;
         let is_paralysable = self.model.law == DeadTimeLaw::Paralysable;
         let before = self.blind_until[usize::from(spad)];
         let is_ready = time > before;
@@ -207,7 +211,7 @@ impl<'a> Avalanches<'a> {
                 }
                 self.blind_until[usize::from(spad)] = until;
             }
-            if is_ready && breeds {
+            if is_ready && triggers {
                 self.queue_children(photon, true);
             }
             return Ok(());
@@ -221,7 +225,7 @@ impl<'a> Avalanches<'a> {
         }
         self.blind_until[usize::from(spad)] = before.max(time + self.dead_time_of(spad));
         self.unknown |= 1 << spad;
-        if breeds {
+        if triggers {
             self.queue_children(photon, false);
         }
         Ok(())
@@ -238,18 +242,18 @@ impl<'a> Avalanches<'a> {
 }
 
 impl PixelStream<'_> {
-    /// The SPADs of this macropixel, where its photons are known from `time` on, or from the beginning. `breeding` are the
-    /// photons before `time` that breed, since [`SpadModel::reach`] at least.
+    /// The SPADs of this macropixel, where its photons are known from `time` on, or from the beginning. `triggering` are the
+    /// photons before `time` that trigger others, since [`SpadModel::reach`] at least.
     pub fn avalanches(
         &self,
         time: Option<Time>,
-        breeding: impl Iterator<Item = Photon>,
+        triggering: impl Iterator<Item = Photon>,
     ) -> Avalanches<'_> {
         let (model, key) = (&self.stream.config().spads, self.stream.key());
         match time {
             Some(time) => {
                 let (pixel, dead_times) = (self.pixel, &self.dead_times);
-                Avalanches::known_from(model, key, pixel, dead_times, time, breeding)
+                Avalanches::known_from(model, key, pixel, dead_times, time, triggering)
             }
             None => Avalanches::in_the_dark(model, key, self.pixel, &self.dead_times),
         }
@@ -307,7 +311,7 @@ mod tests {
             };
             let mut photons: Vec<Photon> = raw
                 .into_iter()
-                .map(|(time_fs, spad, breeds)| Photon { time: Time::from_fs(time_fs), spad, breeds })
+                .map(|(time_fs, spad, triggers)| Photon { time: Time::from_fs(time_fs), spad, triggers })
                 .collect();
             photons.sort();
             let (from, wanted_from) = (Time::from_fs(from_fs), Time::from_fs(from_fs + wait_fs));
@@ -316,8 +320,8 @@ mod tests {
             Avalanches::in_the_dark(&model, [7, 8], 1, &dead_times).run_to_the_end(&photons, &mut all);
             let (before, known) = photons.split_at(photons.partition_point(|p| p.time < from));
             let since = from - model.reach();
-            let breeding = before.iter().filter(|p| p.breeds && p.time >= since).copied();
-            let mut avalanches = Avalanches::known_from(&model, [7, 8], 1, &dead_times, from, breeding);
+            let triggering = before.iter().filter(|p| p.triggers && p.time >= since).copied();
+            let mut avalanches = Avalanches::known_from(&model, [7, 8], 1, &dead_times, from, triggering);
             let mut edges = Vec::new();
             let forever = Time::from_fs(i64::MAX);
             if avalanches.append_edges(known, None, forever, wanted_from, &mut edges).is_ok() {

@@ -24,19 +24,19 @@ pub enum RandomPurpose {
     /// Splits of cohorts of laser cycles.
     Cohort = 5,
     /// Numbers of photons that trigger others.
-    BreedingCounts = 6,
+    TriggeringCounts = 6,
     /// Cycles, times and SPADs of background photons that trigger others.
-    BreedingPhotons = 7,
+    TriggeringPhotons = 7,
     /// Cycles, times and SPADs of signal photons that trigger others.
-    BreedingSignal = 8,
+    TriggeringSignal = 8,
     /// Gaps and SPADs of background photons of bright macropixels.
     BrightPhotons = 9,
     /// Times of signal photons of bright macropixels.
     BrightSignal = 10,
     /// Gaps and SPADs of those background photons that trigger others.
-    BrightBreedingPhotons = 11,
+    BrightTriggeringPhotons = 11,
     /// Times of those signal photons that trigger others.
-    BrightBreedingSignal = 12,
+    BrightTriggeringSignal = 12,
     /// Which photons of a layer of light are kept.
     Thinning = 13,
     /// Phases and dithers of other lasers, and waits before our own laser's pulses.

@@ -14,7 +14,7 @@
 //! [`AFTERPULSE_REACH`] time constants. Crosstalk fires a direct neighbour within the macropixel after
 //! [`CROSSTALK_DELAY`]; what leaves the macropixel is lost. Neither triggers further ones: probabilities are those of
 //! one generation. Which photons trigger others, should they make an avalanche, is drawn with the photons
-//! ([`Photon::breeds`]). What they trigger is drawn from their own time, SPAD and macropixel, so that code which
+//! ([`Photon::triggers`]). What they trigger is drawn from their own time, SPAD and macropixel, so that code which
 //! starts from a known state sees the same.
 
 use smallvec::SmallVec;
@@ -61,7 +61,7 @@ pub struct Photon {
     /// Which SPAD.
     pub spad: u8,
     /// Whether its avalanche, if it makes one, has an afterpulse or crosstalk.
-    pub breeds: bool,
+    pub triggers: bool,
 }
 
 /// What is asked of SPADs depends on the time before the photons are known.
@@ -77,8 +77,12 @@ impl SpadEvent {
 
 impl Photon {
     /// A photon at a time.
-    pub const fn new(time: Time, spad: u8, breeds: bool) -> Self {
-        Photon { time, spad, breeds }
+    pub const fn new(time: Time, spad: u8, triggers: bool) -> Self {
+        Photon {
+            time,
+            spad,
+            triggers,
+        }
     }
 }
 
@@ -89,13 +93,13 @@ impl From<SpadEvent> for Photon {
     }
 }
 
-/// Sorts photons, none of which comes before `from`, as words of time, SPAD (7 bits) and whether they breed; `keys` is room for these. Those of a laser
+/// Sorts photons, none of which comes before `from`, as words of time, SPAD (7 bits) and whether they trigger others; `keys` is room for these. Those of a laser
 /// cycle, some twenty, took 8 % of the time of a drive at night in bright macropixels when whole photons were compared.
 pub fn sort_photons(photons: &mut [Photon], from: Time, keys: &mut Vec<u64>) {
     keys.clear();
     keys.extend(photons.iter().map(|photon| {
         let since_fs = (photon.time - from).as_fs() as u64;
-        since_fs << 8 | u64::from(photon.spad) << 1 | u64::from(photon.breeds)
+        since_fs << 8 | u64::from(photon.spad) << 1 | u64::from(photon.triggers)
     }));
     keys.sort_unstable();
     for (photon, key) in photons.iter_mut().zip(keys) {
@@ -197,7 +201,7 @@ impl SpadModel {
     }
 
     /// Probability that an avalanche triggers others: an afterpulse, crosstalk, or both.
-    pub(crate) fn breeding_probability(&self) -> f64 {
+    pub(crate) fn triggering_probability(&self) -> f64 {
         let (afterpulse, crosstalk) = (self.afterpulse_probability, self.crosstalk_probability);
         afterpulse + crosstalk - afterpulse * crosstalk
     }
@@ -231,7 +235,7 @@ impl SpadModel {
         let words = rand_philox::philox4x32_10(counter, key);
         // One word tells which of the two it causes, given that it causes something.
         let (afterpulse, crosstalk) = (self.afterpulse_probability, self.crosstalk_probability);
-        let choice = rand_philox::u32_to_unit_f64(words[0]) * self.breeding_probability();
+        let choice = rand_philox::u32_to_unit_f64(words[0]) * self.triggering_probability();
         let has_afterpulse = choice < afterpulse;
         let has_crosstalk = choice < afterpulse * crosstalk || choice >= afterpulse;
         let afterpulse = has_afterpulse.then(|| {
@@ -341,15 +345,15 @@ mod tests {
     }
 
     #[test]
-    fn avalanches_that_breed_cause_one_or_the_other_or_both() {
+    fn avalanches_that_trigger_others_cause_one_or_the_other_or_both() {
         let model = SpadModel {
             afterpulse_probability: 0.3,
             afterpulse_time: Time::from_ns(5),
             crosstalk_probability: 0.1,
             ..SpadModel::with_dead_time(Time::from_ns(8))
         };
-        let breeding = model.breeding_probability();
-        assert!((breeding - 0.37).abs() < 1e-12);
+        let triggering = model.triggering_probability();
+        assert!((triggering - 0.37).abs() < 1e-12);
         let n = 20_000;
         let mut counts = [0; 3];
         for caused in children(&model, n) {

@@ -65,7 +65,7 @@ impl Notes {
     }
 
     /// Notes of keys without a section, after what the file is.
-    pub fn of_keys(head: &str, keys: &[(&str, &str)], chosen: Table) -> Self {
+    pub fn from_keys(head: &str, keys: &[(&str, &str)], chosen: Table) -> Self {
         let heads = std::iter::once(("", head));
         let words = heads.chain(keys.iter().copied());
         Notes {
@@ -81,13 +81,13 @@ impl Notes {
     }
 
     /// The comment at a section, an item or, for an empty path, at the head.
-    pub(super) fn at(&self, path: &str) -> Option<&str> {
+    pub(super) fn comment(&self, path: &str) -> Option<&str> {
         self.words.get(path).map(String::as_str)
     }
 
     /// The comment at a key, where it has the value that the comment is about.
-    pub(super) fn of_value(&self, path: &str, value: &Value) -> Option<&str> {
-        let note = self.at(path)?;
+    pub(super) fn comment_on_value(&self, path: &str, value: &Value) -> Option<&str> {
+        let note = self.comment(path)?;
         let mut names = path.split('.');
         let first = self.chosen.get(names.next()?);
         let chosen = names.fold(first, |within, name| match within? {
@@ -135,20 +135,20 @@ mod tests {
     #[test]
     fn comments_are_found_where_they_stand() {
         let notes = Notes::read(FILE, toml::from_str(FILE).unwrap());
-        assert_eq!(notes.at(""), Some("A hall. Chosen."));
-        assert_eq!(notes.at("lidar"), Some("a flash and more"));
-        assert_eq!(notes.at("object.0"), Some("Racks."));
-        assert_eq!(notes.at("object.1"), None);
-        assert_eq!(notes.at("lidar.name"), None);
+        assert_eq!(notes.comment(""), Some("A hall. Chosen."));
+        assert_eq!(notes.comment("lidar"), Some("a flash and more"));
+        assert_eq!(notes.comment("object.0"), Some("Racks."));
+        assert_eq!(notes.comment("object.1"), None);
+        assert_eq!(notes.comment("lidar.name"), None);
     }
 
     #[test]
     fn a_comment_is_about_one_value() {
         let notes = Notes::read(FILE, toml::from_str(FILE).unwrap());
-        let of = |path: &str, value: f64| notes.of_value(path, &value.into());
-        assert_eq!(of("lidar.pde", 0.2), Some("at 940 nm"));
-        assert_eq!(of("lidar.pde", 0.3), None);
-        assert_eq!(of("object.1.yaw_deg", 15.0), Some("turned"));
-        assert_eq!(of("object.0.yaw_deg", 15.0), None);
+        let comment = |path: &str, value: f64| notes.comment_on_value(path, &value.into());
+        assert_eq!(comment("lidar.pde", 0.2), Some("at 940 nm"));
+        assert_eq!(comment("lidar.pde", 0.3), None);
+        assert_eq!(comment("object.1.yaw_deg", 15.0), Some("turned"));
+        assert_eq!(comment("object.0.yaw_deg", 15.0), None);
     }
 }

@@ -30,7 +30,7 @@ impl Section {
 /// its items. `notes` add why a value was chosen.
 pub fn commented(sections: &[Section], values: &Table, left_out: &Table, notes: &Notes) -> String {
     let mut text = String::new();
-    write_note(&mut text, "", notes.at(""));
+    write_note(&mut text, "", notes.comment(""));
     for section in sections {
         if !text.is_empty() {
             text.push('\n');
@@ -49,11 +49,11 @@ pub fn commented(sections: &[Section], values: &Table, left_out: &Table, notes: 
                 for (number, item) in items.iter().filter_map(Value::as_table).enumerate() {
                     let place = path(section.name, &number.to_string());
                     text.push('\n');
-                    write_note(&mut text, "", notes.at(&place));
+                    write_note(&mut text, "", notes.comment(&place));
                     let _ = writeln!(text, "[[{}]]", section.name);
                     for key in section.keys {
                         if let Some(value) = item.get(key.name) {
-                            let note = notes.of_value(&path(&place, key.name), value);
+                            let note = notes.comment_on_value(&path(&place, key.name), value);
                             write_note(&mut text, WHY, note);
                             let _ = writeln!(text, "{} = {value}", key.name);
                         }
@@ -62,7 +62,7 @@ pub fn commented(sections: &[Section], values: &Table, left_out: &Table, notes: 
             }
             Some(Value::Table(table)) => {
                 let left_out = left_out.get(section.name).and_then(Value::as_table);
-                write_note(&mut text, WHY, notes.at(section.name));
+                write_note(&mut text, WHY, notes.comment(section.name));
                 let _ = writeln!(text, "[{}]", section.name);
                 let left_out = left_out.unwrap_or(&nothing);
                 write_keys(&mut text, section, table, left_out, notes);
@@ -99,7 +99,7 @@ fn write_keys(
             let _ = write!(text, " {other} where a file leaves it out.");
         }
         text.push('\n');
-        let note = notes.of_value(&path(section.name, key.name), value);
+        let note = notes.comment_on_value(&path(section.name, key.name), value);
         write_note(text, WHY, note);
         let _ = writeln!(text, "{} = {value}", key.name);
     }

@@ -140,7 +140,7 @@ pub enum NotModelled {
         /// First bin concerned.
         bin: usize,
     },
-    /// Avalanches that prolong a dead time and breed others.
+    /// Avalanches that prolong a dead time and trigger others.
     #[error("afterpulses and crosstalk of paralysable SPADs")]
     SecondariesOfParalysable,
     /// Neighbours that fire together, where events depend on how many do.

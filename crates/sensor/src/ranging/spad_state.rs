@@ -8,7 +8,7 @@
 //!
 //! A SPAD that recovers may have carriers trapped, which fire it once more if no photon does before. Where it is paralysable,
 //! afterpulses come as further light, because what blinds them comes after the avalanche that they are of. Crosstalk
-//! comes as further light from what fires now. Neither breeds, as in [`photon::spad`](crate::photon). This leaves out squares of the two chances.
+//! comes as further light from what fires now. Neither triggers others, as in [`photon::spad`](crate::photon). This leaves out squares of the two chances.
 
 use super::counting::Counting;
 use crate::numerics::Dual;
@@ -158,7 +158,7 @@ impl<'r, const K: usize> Spad<'r, K> {
         self.fired += fired;
     }
 
-    /// The same where avalanches may breed, where light blinds, or where a flip-flop may toggle back.
+    /// The same where avalanches may trigger others, where light blinds, or where a flip-flop may toggle back.
     fn step_bred(&mut self, photons: Dual<K>) {
         let dead = self.dead;
         let recovering = self.blinding.ending();
@@ -177,10 +177,10 @@ impl<'r, const K: usize> Spad<'r, K> {
         // Avalanches of light, without those of afterpulses that came first.
         let mut by_light = fired;
         // The share of what light fires that traps carriers.
-        let mut breeding = Dual::ZERO;
+        let mut triggering = Dual::ZERO;
         if has_traps && !dead.paralysable {
-            breeding = photons * positive(light).recip() * dead.afterpulses;
-            let (released, lost) = self.traps.released(light, breeding, fired, 1.0);
+            triggering = photons * positive(light).recip() * dead.afterpulses;
+            let (released, lost) = self.traps.released(light, triggering, fired, 1.0);
             fired += released - lost;
             by_light = fired - released;
         }
@@ -189,7 +189,7 @@ impl<'r, const K: usize> Spad<'r, K> {
             self.traps.trapping.push(bred * dead.afterpulses);
         }
         if let Some(parity) = &mut self.parity {
-            parity.step(dead.paralysable, light, breeding, self.ready);
+            parity.step(dead.paralysable, light, triggering, self.ready);
         }
         if !dead.paralysable {
             self.ready += recovering - fired;
@@ -234,11 +234,11 @@ impl<'r, const K: usize> Spad<'r, K> {
 
 impl<const K: usize> Traps<K> {
     /// Afterpulses of this step, and avalanches of light that they are in place of, where light would have `fired` so many. A share
-    /// `breeding` of what light fires traps carriers anew. What fires becomes blind with the sign `turn`.
+    /// `triggering` of what light fires traps carriers anew. What fires becomes blind with the sign `turn`.
     fn released(
         &mut self,
         light: Dual<K>,
-        breeding: Dual<K>,
+        triggering: Dual<K>,
         fired: Dual<K>,
         turn: f64,
     ) -> (Dual<K>, Dual<K>) {
@@ -254,9 +254,10 @@ impl<const K: usize> Traps<K> {
         let released = gone * release * both.recip();
         let fired_trapped = gone - released;
         self.trapped += recovering - gone;
-        let fresh = (fired - of_light + fired_trapped) * breeding;
+        let fresh = (fired - of_light + fired_trapped) * triggering;
         let old = fired_trapped * self.kept;
-        self.trapping.push((fresh + old * (one - breeding)) * turn);
+        self.trapping
+            .push((fresh + old * (one - triggering)) * turn);
         (released, of_light - fired_trapped)
     }
 
@@ -280,8 +281,8 @@ fn positive<const K: usize>(mut number: Dual<K>) -> Dual<K> {
 }
 
 impl<const K: usize> Parity<K> {
-    /// A step with so much light, a share `breeding` of whose avalanches traps carriers, on a SPAD that was ready with chance `was_ready`.
-    fn step(&mut self, paralysable: bool, light: Dual<K>, breeding: Dual<K>, was_ready: Dual<K>) {
+    /// A step with so much light, a share `triggering` of whose avalanches traps carriers, on a SPAD that was ready with chance `was_ready`.
+    fn step(&mut self, paralysable: bool, light: Dual<K>, triggering: Dual<K>, was_ready: Dual<K>) {
         let missed = light.exprel_neg();
         let mut recovering = self.blinding.ending();
         if paralysable {
@@ -290,7 +291,7 @@ impl<const K: usize> Parity<K> {
         }
         let mut fired = self.ready * light * missed + recovering * (Dual::constant(1.0) - missed);
         if let Some(traps) = &mut self.traps {
-            let (released, lost) = traps.released(light, breeding, fired, -1.0);
+            let (released, lost) = traps.released(light, triggering, fired, -1.0);
             fired += released - lost;
         }
         let (ready, blind) = (self.ready, self.blind);

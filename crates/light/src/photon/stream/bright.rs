@@ -299,7 +299,7 @@ impl<'a> PixelStream<'a> {
                     self.keeps_background(cycle, spad, time_fs, share, words)
                 };
                 if time >= Time::ZERO && is_kept {
-                    photons.push(Photon::new(time, spad, self.kind == PhotonKind::Breeding));
+                    photons.push(Photon::new(time, spad, self.kind == PhotonKind::Triggering));
                 }
             }
         }

@@ -27,7 +27,7 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 const _: () = assert!(PLACE_BITS + NORMAL_BITS <= u64::BITS);
 
-/// Background photons that breed are rare if a slot of the shortest group has fewer of them on average: numbers that are
+/// Background photons that trigger others are rare if a slot of the shortest group has fewer of them on average: numbers that are
 /// mostly 0 take longer to draw than the photons. Chosen; 8 Mcounts/s with 1 % of afterpulses and of crosstalk have 0.05.
 const RARE: f64 = 1.0;
 
@@ -90,7 +90,7 @@ impl PhotonStream {
                 .is_none_or(|spads| spads.spads() == self.spads()),
             "engines refuse light for other SPADs"
         );
-        let breeding = self.config.spads.breeding_probability();
+        let triggering = self.config.spads.triggering_probability();
         let is_bright = self.config.is_bright(light);
         let mut parts = LightParts::new();
         for (number, layer) in (0..).zip(light.layers()) {
@@ -100,8 +100,8 @@ impl PhotonStream {
                 continue;
             }
             for (kind, share) in [
-                (PhotonKind::Plain, 1.0 - breeding),
-                (PhotonKind::Breeding, breeding),
+                (PhotonKind::Plain, 1.0 - triggering),
+                (PhotonKind::Triggering, triggering),
             ] {
                 if kind == PhotonKind::Plain || share > 0.0 {
                     let mut part = self.part(pixel, &layer, kind, share);
@@ -178,7 +178,7 @@ impl PhotonStream {
             signal: Numbers::new(drawn.unwrap_or(photons)),
             gap_fs: 1e15 / background_hz,
             signal_per_spad: per_spad,
-            has_long_groups: kind == PhotonKind::Breeding
+            has_long_groups: kind == PhotonKind::Triggering
                 && background_hz * self.slots.length_s * f64::from(FIRST) < RARE,
             late_fs: 0,
         };
@@ -211,7 +211,7 @@ impl PixelStream<'_> {
 
     /// Whether these are the photons whose avalanches trigger others.
     pub fn has_secondaries(&self) -> bool {
-        self.kind == PhotonKind::Breeding
+        self.kind == PhotonKind::Triggering
     }
 
     /// The avalanches that a photon of the triggering kind causes, if it makes one itself.
@@ -307,42 +307,42 @@ pub(super) enum PhotonKind {
     /// Those whose avalanches cause no others.
     Plain,
     /// Those whose avalanches do.
-    Breeding,
+    Triggering,
 }
 
 impl PhotonKind {
     pub(super) fn counts(self) -> RandomPurpose {
         match self {
             PhotonKind::Plain => RandomPurpose::PhotonCounts,
-            PhotonKind::Breeding => RandomPurpose::BreedingCounts,
+            PhotonKind::Triggering => RandomPurpose::TriggeringCounts,
         }
     }
 
     pub(super) fn background(self) -> RandomPurpose {
         match self {
             PhotonKind::Plain => RandomPurpose::Photons,
-            PhotonKind::Breeding => RandomPurpose::BreedingPhotons,
+            PhotonKind::Triggering => RandomPurpose::TriggeringPhotons,
         }
     }
 
     pub(super) fn echo(self) -> RandomPurpose {
         match self {
             PhotonKind::Plain => RandomPurpose::Signal,
-            PhotonKind::Breeding => RandomPurpose::BreedingSignal,
+            PhotonKind::Triggering => RandomPurpose::TriggeringSignal,
         }
     }
 
     pub(super) fn bright_background(self) -> u32 {
         match self {
             PhotonKind::Plain => RandomPurpose::BrightPhotons as u32,
-            PhotonKind::Breeding => RandomPurpose::BrightBreedingPhotons as u32,
+            PhotonKind::Triggering => RandomPurpose::BrightTriggeringPhotons as u32,
         }
     }
 
     pub(super) fn bright_echo(self) -> u32 {
         match self {
             PhotonKind::Plain => RandomPurpose::BrightSignal as u32,
-            PhotonKind::Breeding => RandomPurpose::BrightBreedingSignal as u32,
+            PhotonKind::Triggering => RandomPurpose::BrightTriggeringSignal as u32,
         }
     }
 }

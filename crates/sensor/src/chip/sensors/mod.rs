@@ -47,7 +47,7 @@ impl Sensor {
             "hslidar_delay_line" => (hslidar::HEAD, hslidar::WHY_DELAY_LINE),
             _ => return None,
         };
-        Some(Notes::of_keys(head, keys, Sensor::named(name)?.table()))
+        Some(Notes::from_keys(head, keys, Sensor::named(name)?.table()))
     }
 }
 

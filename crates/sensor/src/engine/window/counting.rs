@@ -53,7 +53,7 @@ pub(super) struct Counting<'a> {
     adds: Vec<i64>,
     spacing: Spacing,
     plain: GroupDraws,
-    breeding: ByWindow,
+    triggering: ByWindow,
     /// Photons of parts of the light that are kept by window.
     layers: Vec<ByWindow>,
     past: PastDraws,
@@ -166,7 +166,7 @@ const LITTLE: f64 = 2.0;
 const LITTLE_WITH_SECONDARIES: f64 = 3.0;
 
 /// Which part of a light of one layer causes other avalanches, if one does.
-const BREEDING: usize = 1;
+const TRIGGERING: usize = 1;
 
 /// One macropixel.
 struct Pixel<'p> {
@@ -176,7 +176,7 @@ struct Pixel<'p> {
     /// The first of them, which causes no other avalanches.
     light: &'p PixelStream<'p>,
     /// The photons that do, where there is but one layer.
-    breeding: Option<&'p PixelStream<'p>>,
+    triggering: Option<&'p PixelStream<'p>>,
     /// Photons of `plain.own` and `plain.previous`.
     wanted: [PhotonSelection; 2],
     echo: Option<EchoRows>,
@@ -206,7 +206,7 @@ impl<'a> Counting<'a> {
             },
             adds: (0..=stream.spads()).map(adds).collect(),
             plain: GroupDraws::default(),
-            breeding: ByWindow::default(),
+            triggering: ByWindow::default(),
             layers: Vec::new(),
             past: PastDraws::default(),
             codes: Codes::default(),
@@ -240,7 +240,7 @@ impl<'a> Counting<'a> {
         parts: &[PixelStream<'_>],
     ) -> (Vec<i64>, EngineWork) {
         let light = &parts[0];
-        let breeding = parts.get(BREEDING).filter(|_| light.is_alone);
+        let triggering = parts.get(TRIGGERING).filter(|_| light.is_alone);
         let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs];
         let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
         let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
@@ -258,7 +258,7 @@ impl<'a> Counting<'a> {
             sight,
             parts,
             light,
-            breeding,
+            triggering,
             wanted,
             echo: has_clk_bins
                 .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs))
@@ -270,7 +270,7 @@ impl<'a> Counting<'a> {
         };
         self.plain.carried.clear();
         self.past.clear();
-        self.breeding.clear();
+        self.triggering.clear();
         if light.is_bright {
             self.count_bright(&mut pixel);
             return (pixel.hits, pixel.work);
@@ -282,7 +282,7 @@ impl<'a> Counting<'a> {
             return (pixel.hits, pixel.work);
         }
         let expected = light.expected(&sight.plain.own) + light.expected(&sight.plain.previous);
-        let little = match breeding {
+        let little = match triggering {
             Some(_) => LITTLE_WITH_SECONDARIES,
             None => LITTLE,
         };
@@ -293,7 +293,7 @@ impl<'a> Counting<'a> {
         }
         self.tables.clear_counts();
         let before_exposure_fs = sight
-            .breeding
+            .triggering
             .own
             .within_fs
             .start
@@ -302,9 +302,10 @@ impl<'a> Counting<'a> {
         for group in self.stream.groups() {
             let cycles = group.cycles_in(self.stream.config().laser_cycles);
             pixel.work.photons_drawn += self.plain.draw(light, group, &sight.plain);
-            if let Some(breeding) = breeding {
-                let (first, spans) = (group.first_cycle(), &sight.breeding);
-                pixel.work.photons_drawn += self.breeding.draw(breeding, self.stream, first, spans);
+            if let Some(triggering) = triggering {
+                let (first, spans) = (group.first_cycle(), &sight.triggering);
+                pixel.work.photons_drawn +=
+                    self.triggering.draw(triggering, self.stream, first, spans);
             }
             // Photons that come before the exposure are left out there.
             let is_first = group.first_cycle() == 0 && sees_before;
@@ -363,8 +364,8 @@ impl<'a> Counting<'a> {
         }
         self.tables
             .put_group(&self.codes, group.cycles() as usize, counted);
-        if pixel.breeding.is_some() {
-            self.count_breeding_cycles(pixel, group);
+        if pixel.triggering.is_some() {
+            self.count_triggering_cycles(pixel, group);
         }
         let mut index = 0;
         while let Some(special) = self.tables.special(index, &self.codes) {
@@ -450,7 +451,7 @@ impl Pixel<'_> {
     /// What is drawn of a part of the light.
     fn spans(&self, part: &PixelStream<'_>) -> &Spans {
         if part.has_secondaries() {
-            &self.sight.breeding
+            &self.sight.triggering
         } else {
             &self.sight.plain
         }
@@ -468,9 +469,9 @@ impl Pixel<'_> {
                 .echoes_within(&(spans.from_fs..self.sight.until_fs))
                 .all(|later| later == 0)
         };
-        let breeding = self.breeding;
+        let triggering = self.triggering;
         sees_own_only(self.light, &self.sight.plain)
-            && breeding.is_none_or(|light| sees_own_only(light, &self.sight.breeding))
+            && triggering.is_none_or(|light| sees_own_only(light, &self.sight.triggering))
     }
 }
 

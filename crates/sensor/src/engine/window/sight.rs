@@ -8,7 +8,7 @@
 //!   drawn            ·      ·   ╰──────┴──────┴──────┴──────┴──────╯      ·      ·      ·      ·
 //! ```
 //!
-//! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn. Photons that breed are
+//! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn. Photons that trigger others are
 //! drawn from as much earlier on as afterpulses may take.
 
 use smallvec::SmallVec;
@@ -148,10 +148,10 @@ pub(super) struct Sight {
     pub first_fs: i64,
     /// Where the last bin is over for certain.
     pub until_fs: i64,
-    /// What is drawn of photons that do not breed.
+    /// What is drawn of photons that trigger no others.
     pub plain: Spans,
     /// What is drawn of those that do.
-    pub breeding: Spans,
+    pub triggering: Spans,
 }
 
 impl Sight {
@@ -176,20 +176,20 @@ impl Sight {
         let from_fs = first_fs - spads.longest_dead_time().as_fs() - ROUNDING_FS;
         let until_fs = end_fs + ROUNDING_FS;
         let plain = Spans::new(stream, from_fs, until_fs)?;
-        let breeding_from_fs = plain.from_fs - spads.reach().as_fs() - 2 * ROUNDING_FS;
+        let triggering_from_fs = plain.from_fs - spads.reach().as_fs() - 2 * ROUNDING_FS;
         Some(Sight {
             window: *window,
             rows: Rows::new(law, window),
             first_fs,
             until_fs,
-            breeding: Spans::new(stream, breeding_from_fs, until_fs)?,
+            triggering: Spans::new(stream, triggering_from_fs, until_fs)?,
             plain,
         })
     }
 
     /// Whether the first window that has photons may see one that comes before the exposure and is none.
     pub(super) fn sees_the_beginning(&self) -> bool {
-        self.plain.sees_the_beginning() || self.breeding.sees_the_beginning()
+        self.plain.sees_the_beginning() || self.triggering.sees_the_beginning()
     }
 }
 

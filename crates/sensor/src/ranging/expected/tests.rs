@@ -104,7 +104,7 @@ fn the_dark_stands_still() {
                 .zip(&steady)
                 .map(|(a, b)| (a / b - 1.0).abs())
                 .fold(0.0, f64::max);
-            // Rounds of breeding are few: 6.5·10⁻⁷ at most here.
+            // Rounds of triggering are few: 6.5·10⁻⁷ at most here.
             assert!(
                 worst < 2e-6,
                 "{dead_time_ns} ns, {background_per_bin}: {worst}"

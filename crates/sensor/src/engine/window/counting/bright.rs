@@ -194,28 +194,28 @@ impl Counting<'_> {
             self.photons.clear();
             let parts = pixel.parts;
             let is_drawn = |part: usize| back > pixel.look_back || near.contains(&part);
-            let of_kind = |breeds: bool| {
+            let of_kind = |triggers: bool| {
                 (0..parts.len())
-                    .filter(move |&n| parts[n].has_secondaries() == breeds && is_drawn(n))
+                    .filter(move |&n| parts[n].has_secondaries() == triggers && is_drawn(n))
             };
             for part in of_kind(true) {
-                self.push_breeding(pixel, part, begin, &window);
+                self.push_triggering(pixel, part, begin, &window);
             }
             // Mostly there are none, and nothing is allocated.
-            let breeding_photons: Vec<_> = self.photons.drain(..).collect();
+            let triggering_photons: Vec<_> = self.photons.drain(..).collect();
             for part in of_kind(false) {
                 self.push_photons(pixel, part, begin, &window);
             }
             let known_from = begin.time.unwrap_or(Time::ZERO);
             let is_later = |photon: &&Photon| photon.time >= known_from;
             self.photons
-                .extend(breeding_photons.iter().filter(is_later));
+                .extend(triggering_photons.iter().filter(is_later));
             let mut echoes = pixel.light.ordered_echoes();
             for cycle in self.echoes(pixel.light, known_from, &window) {
                 echoes.add(cycle);
             }
             self.events.clear();
-            let are_apart = breeding_photons.is_empty() && echoes.is_empty();
+            let are_apart = triggering_photons.is_empty() && echoes.is_empty();
             if are_apart
                 && self
                     .rows
@@ -232,7 +232,7 @@ impl Counting<'_> {
                 continue;
             }
             sort_photons(&mut self.photons, known_from, &mut self.keys);
-            let earlier = breeding_photons
+            let earlier = triggering_photons
                 .iter()
                 .filter(|photon| photon.time < known_from);
             let mut avalanches = pixel.light.avalanches(begin.time, earlier.copied());
@@ -293,8 +293,8 @@ impl Counting<'_> {
         }
     }
 
-    /// Appends the photons of a part of the light that breed since a beginning, and before it as far as what they cause may come later.
-    fn push_breeding(
+    /// Appends the photons of a part of the light that trigger others since a beginning, and before it as far as what they cause may come later.
+    fn push_triggering(
         &mut self,
         pixel: &Pixel<'_>,
         part: usize,
@@ -334,7 +334,7 @@ impl Counting<'_> {
             }
         }
         let from = begin.time.unwrap_or(Time::ZERO);
-        // What breeds is asked for before `from`, too.
+        // Photons that trigger others are asked for before `from`, too.
         let is_wanted = |photon: &&Photon| {
             (light.has_secondaries() || photon.time >= from) && photon.time < until
         };

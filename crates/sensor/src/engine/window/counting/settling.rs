@@ -109,7 +109,7 @@ impl Counting<'_> {
                 // Photons that cause others did not matter to the window so far, but may when it is looked back.
                 pixel.work = work;
                 self.fired[..=pixel.hits.len()].fill(0);
-                let photons = self.breeding.photons(laser_cycle..laser_cycle + 1).iter();
+                let photons = self.triggering.photons(laser_cycle..laser_cycle + 1).iter();
                 self.photons.clear();
                 self.photons.extend(photons.map(|&(_, photon)| photon));
                 self.take_cycle(pixel, Some(last), laser_cycle);
@@ -218,7 +218,7 @@ impl Counting<'_> {
         let fire = |number: usize, _: i64| rows.push(photons[number].1);
         let known = self.fire_by_times(pixel.sight, times_fs, fire);
         if known.is_none() {
-            if pixel.breeding.is_some() {
+            if pixel.triggering.is_some() {
                 return false;
             }
             let photons = photons.iter().map(|&(time_fs, _)| {

@@ -17,10 +17,10 @@ impl Counting<'_> {
         by_cycle.clear();
         by_cycle.extend(self.plain.photons(pixel.light, self.stream, group, cycles));
         self.other_echoes(pixel, pixel.light, group, &mut by_cycle);
-        if let Some(breeding) = pixel.breeding {
-            let photons = self.breeding.of_group(group).iter();
+        if let Some(triggering) = pixel.triggering {
+            let photons = self.triggering.of_group(group).iter();
             by_cycle.extend(photons.map(|&(cycle, photon)| (cycle - group.first_cycle(), photon)));
-            self.other_echoes(pixel, breeding, group, &mut by_cycle);
+            self.other_echoes(pixel, triggering, group, &mut by_cycle);
         }
         self.settle_cycles(pixel, group, &mut by_cycle);
         self.by_cycle = by_cycle;
@@ -113,13 +113,13 @@ impl Counting<'_> {
         }
     }
 
-    /// Settles the cycles in which an avalanche that breeds may matter. Their photons are in no table afterwards.
-    pub(super) fn count_breeding_cycles(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup) {
-        let Some(light) = pixel.breeding else {
+    /// Settles the cycles in which an avalanche that triggers others may matter. Their photons are in no table afterwards.
+    pub(super) fn count_triggering_cycles(&mut self, pixel: &mut Pixel<'_>, group: CycleGroup) {
+        let Some(light) = pixel.triggering else {
             return;
         };
-        let breeding = std::mem::take(&mut self.breeding);
-        for photons in breeding.of_group(group).chunk_by(|a, b| a.0 == b.0) {
+        let triggering = std::mem::take(&mut self.triggering);
+        for photons in triggering.of_group(group).chunk_by(|a, b| a.0 == b.0) {
             let laser_cycle = photons[0].0;
             let start = self.stream.cycle_start(laser_cycle);
             let from = start + Time::from_fs(pixel.sight.plain.from_fs);
@@ -139,7 +139,7 @@ impl Counting<'_> {
             self.take_cycle(pixel, last, laser_cycle);
             self.settle_cycle(pixel, laser_cycle);
         }
-        self.breeding = breeding;
+        self.triggering = triggering;
     }
 
     /// Takes the `last` photon of a cycle and those before it out of the tables, and appends them to `photons`.
@@ -211,16 +211,16 @@ impl Counting<'_> {
         let past = |part| pixel.spans(part).past(self.stream, window.laser_cycle);
         let mut pasts: SmallVec<[Past<'_>; 2]> = pixel.parts.iter().map(past).collect();
         loop {
-            // Photons that breed are known from earlier on.
+            // Photons that trigger others are known from earlier on.
             let known_from = pasts[0].known_from();
             self.photons.sort_unstable();
             let earlier =
                 known_from.map_or(0, |from| self.photons.partition_point(|p| p.time < from));
             let later = self.photons.partition_point(|p| p.time < until);
-            let breeding = self.photons[..earlier]
+            let triggering = self.photons[..earlier]
                 .iter()
-                .filter(|photon| photon.breeds);
-            let mut avalanches = pixel.light.avalanches(known_from, breeding.copied());
+                .filter(|photon| photon.triggers);
+            let mut avalanches = pixel.light.avalanches(known_from, triggering.copied());
             self.events.clear();
             let photons = &self.photons[earlier..later.max(earlier)];
             let known =
@@ -237,7 +237,7 @@ impl Counting<'_> {
     }
 }
 
-// Photons of one part of the light, kept by the laser cycle of their window: those that breed, which are few and drawn for
+// Photons of one part of the light, kept by the laser cycle of their window: those that trigger others, which are few and drawn for
 // many laser cycles at once, and all of light with several layers.
 //
 // ```text

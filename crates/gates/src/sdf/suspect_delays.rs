@@ -1,4 +1,4 @@
-//! What a delay file may say, but hardly means: delays of zero, and a cell twice.
+//! Delays of a file that are allowed and probably mistakes: delays of zero, and a cell twice.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -7,10 +7,10 @@ use super::{DelayPath, Sdf, SdfCell, SdfDelay, SdfInstance};
 use crate::netlist::Corner;
 use crate::units::Time;
 
-/// One of them.
+/// Delays of a file that are probably a mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Oddity {
+pub enum SuspectDelay {
     /// Arcs without delay.
     Zeros {
         /// How many.
@@ -31,25 +31,25 @@ pub enum Oddity {
     },
 }
 
-impl Oddity {
+impl SuspectDelay {
     /// Line of the first.
     pub fn line(&self) -> usize {
         match self {
-            Oddity::Zeros { line, .. } | Oddity::Twice { line, .. } => *line,
+            SuspectDelay::Zeros { line, .. } | SuspectDelay::Twice { line, .. } => *line,
         }
     }
 }
 
-impl fmt::Display for Oddity {
+impl fmt::Display for SuspectDelay {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Oddity::Zeros { zeros, arcs, .. } if zeros == arcs => {
+            SuspectDelay::Zeros { zeros, arcs, .. } if zeros == arcs => {
                 write!(f, "every delay is zero, so that gates switch at once")
             }
-            Oddity::Zeros { zeros, arcs, .. } => {
+            SuspectDelay::Zeros { zeros, arcs, .. } => {
                 write!(f, "{zeros} of {arcs} delays are zero")
             }
-            Oddity::Twice {
+            SuspectDelay::Twice {
                 entries, before, ..
             } => {
                 write!(
@@ -65,8 +65,8 @@ impl fmt::Display for Oddity {
     }
 }
 
-/// What is odd about the delays of a file in one corner.
-pub fn oddities(sdf: &Sdf<'_>, corner: Corner) -> Vec<Oddity> {
+/// The delays of a file that are probably mistakes, in one corner.
+pub fn suspect_delays(sdf: &Sdf<'_>, corner: Corner) -> Vec<SuspectDelay> {
     let is_arc = |delay: &&SdfDelay<'_>| {
         let is_of_cell = matches!(delay.path, DelayPath::IoPath(..) | DelayPath::Device(_));
         is_of_cell && !delay.increment
@@ -93,14 +93,14 @@ pub fn oddities(sdf: &Sdf<'_>, corner: Corner) -> Vec<Oddity> {
         }
     }
     if zeros > 0 {
-        found.push(Oddity::Zeros {
+        found.push(SuspectDelay::Zeros {
             zeros,
             arcs: all,
             line,
         });
     }
     let mut first: HashMap<&str, &SdfCell<'_>> = HashMap::new();
-    let mut twice: Option<Oddity> = None;
+    let mut twice: Option<SuspectDelay> = None;
     for cell in &sdf.cells {
         let SdfInstance::Path(path) = &cell.instance else {
             continue;
@@ -119,9 +119,9 @@ pub fn oddities(sdf: &Sdf<'_>, corner: Corner) -> Vec<Oddity> {
         };
         if own.any(is_given) {
             match &mut twice {
-                Some(Oddity::Twice { entries, .. }) => *entries += 1,
+                Some(SuspectDelay::Twice { entries, .. }) => *entries += 1,
                 _ => {
-                    twice = Some(Oddity::Twice {
+                    twice = Some(SuspectDelay::Twice {
                         entries: 1,
                         line: cell.line,
                         before: before.line,
@@ -140,12 +140,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn oddities_are_told_with_their_line() {
+    fn suspect_delays_are_told_with_their_line() {
         let told = |body: &str| {
             let text = file(body);
             let sdf = Sdf::parse("a.sdf", &text).expect("delays");
-            let told = |oddity: &Oddity| (oddity.line(), oddity.to_string());
-            oddities(&sdf, Corner::Typ)
+            let told = |suspect: &SuspectDelay| (suspect.line(), suspect.to_string());
+            suspect_delays(&sdf, Corner::Typ)
                 .iter()
                 .map(told)
                 .collect::<Vec<_>>()
