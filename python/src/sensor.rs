@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use guided_dtof::chip::sensors::CHIPS;
+use guided_dtof::chip::sensors::{self, CHIPS};
 use guided_dtof::chip::{Sensor as Chip, SensorConfig};
 use guided_dtof::request::Sources;
 use pyo3::exceptions::PyAttributeError;
@@ -141,16 +141,16 @@ impl Sensor {
     /// The call that makes it, from the chip that it shares most keys with.
     fn __repr__(&self) -> String {
         let own = self.table();
-        let arguments_after = |(name, chip): &(&str, fn() -> Chip)| {
-            let usual = Table::try_from(&*chip()).expect("numbers and words");
+        let arguments_after = |chip: &sensors::Chip| {
+            let usual = Table::try_from(&*(chip.sensor)()).expect("numbers and words");
             let is_other = |(key, value): &(&String, &Value)| usual.get(*key) != Some(*value);
             let keys = own.iter().filter(is_other).map(|(key, value)| match value {
                 Value::Boolean(true) => format!("{key}=True"),
                 Value::Boolean(false) => format!("{key}=False"),
                 value => format!("{key}={value}"),
             });
-            let is_default = *name == CHIPS[0].0;
-            let name = (!is_default).then(|| format!("{name:?}"));
+            let is_default = chip.name == CHIPS[0].name;
+            let name = (!is_default).then(|| format!("{:?}", chip.name));
             name.into_iter().chain(keys).collect::<Vec<String>>()
         };
         let calls = CHIPS.iter().map(arguments_after);

@@ -101,7 +101,7 @@ impl SensorArgs {
     /// Why the values of the chip were chosen, if it is built in.
     fn notes(&self) -> Notes {
         let sources = self.sources(None);
-        let default = self.sensor.is_none().then_some(CHIPS[0].0);
+        let default = self.sensor.is_none().then_some(CHIPS[0].name);
         let name = sources.chip().or(default);
         name.and_then(Sensor::built_in_notes).unwrap_or_default()
     }
@@ -109,7 +109,7 @@ impl SensorArgs {
     /// What the top of the exported chip is called: modes of a chip are named after it.
     pub(super) fn chip(&self) -> &'static str {
         let asked = self.sources(None).chip().unwrap_or(array::NAME);
-        let mut chips = CHIPS.iter().map(|(chip, _)| *chip);
+        let mut chips = CHIPS.iter().map(|chip| chip.name);
         chips.find(|chip| asked.starts_with(chip)).unwrap_or(asked)
     }
 

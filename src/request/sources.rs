@@ -120,7 +120,7 @@ impl Sources {
     /// The built-in chip that is asked for by its name.
     pub(crate) fn chip(&self) -> Option<&'static str> {
         let name = self.sensor.as_ref().filter(|path| is_name(path))?.to_str();
-        let mut chips = CHIPS.iter().map(|(chip, _)| *chip);
+        let mut chips = CHIPS.iter().map(|chip| chip.name);
         chips.find(|&chip| name == Some(chip))
     }
 
@@ -139,7 +139,7 @@ impl Sources {
 fn is_name(path: &Path) -> bool {
     if path.is_dir() {
         let is_scene = |name: &str| Scene::built_in().any(|(known, _)| known == name);
-        let is_chip = |name: &str| CHIPS.iter().any(|(known, _)| *known == name);
+        let is_chip = |name: &str| CHIPS.iter().any(|chip| chip.name == name);
         return path
             .to_str()
             .is_some_and(|name| is_scene(name) || is_chip(name));
@@ -256,7 +256,7 @@ fn described(path: &Path, spelling: Spelling) -> Result<Document, InputError> {
         ));
     }
     let chip = path.to_str().and_then(Sensor::named).ok_or_else(|| {
-        let instead = instead_of(&path.to_string_lossy(), CHIPS.map(|(name, _)| name));
+        let instead = instead_of(&path.to_string_lossy(), CHIPS.map(|chip| chip.name));
         let message = format!("is neither a file nor a chip; {instead}");
         InputError::new(path.display(), message)
     })?;

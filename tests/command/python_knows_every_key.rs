@@ -46,7 +46,7 @@ fn type_of(schema: &Json, usual: &toml::Value) -> String {
 }
 
 fn module() -> String {
-    let chips = literal(CHIPS.iter().map(|(name, _)| *name));
+    let chips = literal(CHIPS.iter().map(|chip| chip.name));
     let scenes = literal(Scene::built_in().map(|(name, _)| name));
     let mut text = format!("{HEAD}SensorName = {chips}\n\nSceneName = {scenes}\n\n");
     text += "\nclass SensorKeys(TypedDict, total=False):\n    \"\"\"Keys of a sensor. `gdtof sensor` prints what each is, its unit and range.\"\"\"\n\n";

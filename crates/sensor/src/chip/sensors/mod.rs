@@ -20,34 +20,63 @@ pub use vcsel_flash::vcsel_flash;
 
 use crate::settings::Notes;
 
-/// A chip's name, and what makes its [`Sensor`].
-pub type Chip = (&'static str, fn() -> Sensor);
+/// A chip that is described here.
+#[derive(Debug, Clone, Copy)]
+pub struct Chip {
+    /// What `--sensor` takes.
+    pub name: &'static str,
+    /// Makes its [`Sensor`].
+    pub sensor: fn() -> Sensor,
+    /// What it is.
+    pub head: &'static str,
+    /// Why its main values were chosen, by their keys.
+    pub reasons: &'static [(&'static str, &'static str)],
+}
 
-/// The chips described here.
+/// The chips described here; the first is the default.
 pub const CHIPS: [Chip; 4] = [
-    ("quantic4x4", quantic4x4),
-    ("vcsel_flash", vcsel_flash),
-    ("hslidar", hslidar),
-    ("hslidar_delay_line", hslidar_delay_line),
+    Chip {
+        name: "quantic4x4",
+        sensor: quantic4x4,
+        head: quantic4x4::HEAD,
+        reasons: quantic4x4::WHY,
+    },
+    Chip {
+        name: "vcsel_flash",
+        sensor: vcsel_flash,
+        head: vcsel_flash::HEAD,
+        reasons: vcsel_flash::WHY,
+    },
+    Chip {
+        name: "hslidar",
+        sensor: hslidar,
+        head: hslidar::HEAD,
+        reasons: hslidar::WHY,
+    },
+    Chip {
+        name: "hslidar_delay_line",
+        sensor: hslidar_delay_line,
+        head: hslidar::HEAD,
+        reasons: hslidar::WHY_DELAY_LINE,
+    },
 ];
+
+/// The chip of this name, one of [`CHIPS`].
+fn chip(name: &str) -> Option<&'static Chip> {
+    CHIPS.iter().find(|chip| chip.name == name)
+}
 
 impl Sensor {
     /// The chip of this name, one of [`CHIPS`].
     pub fn named(name: &str) -> Option<Self> {
-        let chip = CHIPS.iter().find(|(known, _)| *known == name);
-        chip.map(|(_, chip)| chip())
+        chip(name).map(|chip| (chip.sensor)())
     }
 
     /// Why the main values of the chip of this name, one of [`CHIPS`], were chosen.
     pub fn built_in_notes(name: &str) -> Option<Notes> {
-        let (head, keys) = match name {
-            "quantic4x4" => (quantic4x4::HEAD, quantic4x4::WHY),
-            "vcsel_flash" => (vcsel_flash::HEAD, vcsel_flash::WHY),
-            "hslidar" => (hslidar::HEAD, hslidar::WHY),
-            "hslidar_delay_line" => (hslidar::HEAD, hslidar::WHY_DELAY_LINE),
-            _ => return None,
-        };
-        Some(Notes::from_keys(head, keys, Sensor::named(name)?.table()))
+        let chip = chip(name)?;
+        let chosen = (chip.sensor)().table();
+        Some(Notes::from_keys(chip.head, chip.reasons, chosen))
     }
 }
 
@@ -116,7 +145,10 @@ mod tests {
 
     #[test]
     fn every_chip_is_possible_and_has_its_name() {
-        for (name, chip) in CHIPS {
+        for Chip {
+            name, sensor: chip, ..
+        } in CHIPS
+        {
             assert!(chip().check().is_ok(), "{name}");
             assert_eq!(Sensor::named(name), Some(chip()));
             // The file with reasons reads back unchanged, and has them all.
