@@ -1,7 +1,5 @@
 //! What a run of the command may not lose: the files that it reads, and files that are not its own where it writes.
 //!
-//! [`open_file`] is the only place where files are opened to be read; clippy refuses others. It takes nothing that need not end.
-//!
 //! From [`guard_inputs`] on, every file that is opened by [`open_input`] is known by its device and inode (elsewhere than on Unix by
 //! its path without links). Whatever replaces files, [`super::OutputFile`] and [`super::ResultSet`], asks [`refuse_input`] first.
 //!
@@ -14,7 +12,8 @@ use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::result_set::owner_of;
+use super::manifest::owner_of;
+use super::open::open_file;
 use super::temporary::Registry;
 use femtogate::InputError;
 
@@ -51,49 +50,6 @@ pub fn said_of_kept_files() -> Vec<String> {
     let mut guarded = guarded();
     let sentences = guarded.as_mut().map(|g| std::mem::take(&mut g.sentences));
     sentences.unwrap_or_default()
-}
-
-/// Opens a file to be read. A pipe without a place in the file system, as of `<(...)` or of standard input, is one: its other
-/// end is held by a process that the user has just started.
-///
-/// # Errors
-/// A named pipe, a device, a folder, and what cannot be opened.
-pub fn open_file(path: &Path) -> Result<File, InputError> {
-    if path.as_os_str().is_empty() {
-        return Err(InputError::new("\"\"", "is no name of a file; give one"));
-    }
-    let unreadable = |e| InputError::unreadable(path, &e);
-    let kind = fs::metadata(path).map_err(unreadable)?.file_type();
-    let complain = |message: String| Err(InputError::new(path.display(), message));
-    if kind.is_dir() {
-        return complain("is a folder; give a file".into());
-    }
-    if let Some(what) = endless(path, kind) {
-        let cure = "which may never end; write its contents to a file first";
-        return complain(format!("is {what}, {cure}"));
-    }
-    #[expect(clippy::disallowed_methods, reason = "this is the one place")]
-    File::open(path).map_err(unreadable)
-}
-
-/// What something is whose end nobody knows.
-#[cfg(unix)]
-fn endless(path: &Path, kind: fs::FileType) -> Option<&'static str> {
-    use std::os::unix::fs::FileTypeExt;
-    if kind.is_fifo() && path.canonicalize().is_ok() {
-        Some("a named pipe")
-    } else if kind.is_char_device() || kind.is_block_device() {
-        Some("a device")
-    } else if kind.is_socket() {
-        Some("a socket")
-    } else {
-        None
-    }
-}
-
-#[cfg(not(unix))]
-fn endless(_: &Path, _: fs::FileType) -> Option<&'static str> {
-    None
 }
 
 /// Opens a file that the user gives to be read.
@@ -280,32 +236,5 @@ mod tests {
             fs::read_link(dir.path().join("x.kept.log")).unwrap(),
             target
         );
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn what_may_never_end_is_not_opened() {
-        use std::os::unix::fs::symlink;
-        let dir = tempfile::tempdir().unwrap();
-        let path = |name: &str| dir.path().join(name);
-        let made = std::process::Command::new("mkfifo")
-            .arg(path("pipe"))
-            .status();
-        assert!(made.unwrap().success());
-        symlink(path("pipe"), path("link")).unwrap();
-        symlink("/dev/zero", path("zero")).unwrap();
-        let _socket = std::os::unix::net::UnixListener::bind(path("socket")).unwrap();
-        for (name, says) in [
-            ("pipe", "is a named pipe"),
-            ("link", "is a named pipe"),
-            ("zero", "is a device"),
-            ("socket", "is a socket"),
-            ("", "is a folder"),
-        ] {
-            let refused = open_file(&path(name)).unwrap_err().to_string();
-            assert!(refused.contains(says), "{refused}");
-        }
-        fs::write(path("file"), "").unwrap();
-        assert!(open_file(&path("file")).is_ok());
     }
 }

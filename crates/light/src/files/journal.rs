@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::guarded::open_file;
+use super::open::open_file;
 use super::temporary::lock;
 use femtogate::InputError;
 

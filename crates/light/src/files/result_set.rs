@@ -16,19 +16,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::{self, BufReader, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
+use serde::Serialize;
 
-use super::guarded::{free_name, open_file, refuse_input, set_aside_sentence};
+use super::guarded::{free_name, refuse_input, set_aside_sentence};
+use super::manifest::{MANIFEST, Manifest, ManifestFile, PROGRAM};
 use super::output::create_folder;
 use super::temporary::{Registry, Temporary, lock, open_folder};
 use femtogate::InputError;
-
-/// Name of the manifest.
-pub const MANIFEST: &str = "manifest.json";
 
 /// A set of results that is being made.
 #[derive(Debug)]
@@ -50,98 +47,6 @@ impl Drop for MadeFolder {
         // One that is not empty stays.
         let _ = fs::remove_dir(&self.0);
     }
-}
-
-/// What a manifest says of a file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ManifestFile {
-    /// Name in the manifest's folder.
-    pub name: String,
-    /// Size in bytes.
-    pub bytes: u64,
-    /// SHA-256 of the contents, hexadecimal.
-    pub sha256: String,
-}
-
-/// Bytes of a file, and their hash, SHA-256 in hexadecimal digits.
-///
-/// # Errors
-/// When it cannot be read.
-pub fn file_hash(path: &Path) -> io::Result<(u64, String)> {
-    let mut file = open_file(path).map_err(io::Error::other)?;
-    let mut hash = Sha256::new();
-    let mut bytes = 0;
-    let mut chunk = vec![0; 1 << 18];
-    loop {
-        match file.read(&mut chunk)? {
-            0 => break,
-            n => {
-                hash.update(&chunk[..n]);
-                bytes += n as u64;
-            }
-        }
-    }
-    let digits = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
-    Ok((bytes, digits))
-}
-
-impl ManifestFile {
-    fn from_file(folder: &Path, name: &str) -> io::Result<Self> {
-        let (bytes, sha256) = file_hash(&folder.join(name))?;
-        Ok(ManifestFile {
-            name: name.to_owned(),
-            bytes,
-            sha256,
-        })
-    }
-}
-
-/// The manifest, as far as this program reads it again.
-#[derive(Debug, Serialize, Deserialize)]
-struct Manifest {
-    program: String,
-    version: String,
-    command: String,
-    complete: bool,
-    files: Vec<ManifestFile>,
-    /// Only while one set replaces another: the files of the other.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    previous_files: Vec<ManifestFile>,
-    #[serde(default)]
-    configuration: serde_json::Value,
-}
-
-impl Manifest {
-    /// The manifest of a folder, if it has one that is ours.
-    fn read(folder: &Path) -> Option<Self> {
-        let path = folder.join(MANIFEST);
-        if !fs::symlink_metadata(&path).ok()?.is_file() {
-            return None;
-        }
-        let file = BufReader::new(open_file(&path).ok()?);
-        let manifest: Manifest = serde_json::from_reader(file).ok()?;
-        let files = || manifest.files.iter().chain(&manifest.previous_files);
-        // Names that lead elsewhere are none of ours.
-        let is_plain = |f: &ManifestFile| Path::new(&f.name).file_name() == Some(f.name.as_ref());
-        (manifest.program == PROGRAM && files().all(is_plain)).then_some(manifest)
-    }
-
-    fn write(&self, path: &Path) -> io::Result<()> {
-        let mut text = serde_json::to_string_pretty(self)?;
-        text.push('\n');
-        fs::write(path, text)
-    }
-}
-
-const PROGRAM: &str = "gdtof";
-
-/// The command whose results the file `path` is one of.
-pub(super) fn owner_of(path: &Path) -> Option<String> {
-    fs::symlink_metadata(path).ok()?;
-    let manifest = Manifest::read(path.parent()?)?;
-    let is_its = |file: &ManifestFile| path.file_name() == Some(file.name.as_ref());
-    let mut files = manifest.files.iter().chain(&manifest.previous_files);
-    files.any(is_its).then_some(manifest.command)
 }
 
 /// The set in `folder`, which one of `command` may replace.

@@ -14,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use sha2::{Digest, Sha256};
 
-use super::guarded::open_file;
+use super::open::open_file;
 
 const PREFIX: &str = ".gdtof-";
 

@@ -57,6 +57,7 @@ mod ordered;
 mod part;
 mod schedule;
 mod slot;
+mod strays;
 
 pub use bright::{BackgroundBlock, TILE, spad_of};
 pub(super) use dim::{ByCycle, SPAD_SHIFT};

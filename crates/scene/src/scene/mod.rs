@@ -13,6 +13,7 @@ mod curve;
 mod daylight;
 mod entry;
 mod eye_safety;
+mod falling;
 mod file;
 mod fog;
 mod heat;

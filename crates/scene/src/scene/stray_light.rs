@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::curve::CurveSetting;
-use super::illumination::Falling;
+use super::falling::Falling;
 use super::settings::{Lidar, Scene};
 use crate::photon::{Glint, PulseTrain, merged};
 use crate::units::Time;

@@ -19,6 +19,7 @@ use multiversion::multiversion;
 
 use super::codes::{Code, Codes, SPAD_BITS, bin_mark, spad_mark};
 use super::echo_rows::{EchoRows, PassedEdges};
+use super::photon_selection::PhotonSelection;
 use super::sight::ROUNDING_FS;
 use crate::photon::{Draw, GroupPlace, PER_BLOCK, PixelStream, Slots, TIME_BITS};
 
@@ -253,27 +254,6 @@ fn doubt(steps: u32, words: &[u32], codes: &mut [Code]) {
         let step = word % (1 << TIME_BITS);
         let is_doubtful = (step + steps) % (1 << TIME_BITS) < 2 * steps;
         *code = code.doubtful_if(is_doubtful);
-    }
-}
-
-/// Which photons of a draw are wanted, and what for.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PhotonSelection {
-    /// Those of cycles before this one of the group.
-    pub cycles: u32,
-    /// By how many cycles their windows come after them.
-    pub later: u32,
-    /// When bin 0 begins, counted from the start of their own cycle, fs.
-    pub origin_fs: i64,
-    /// The slot that begins with bin 0. It need not exist.
-    pub origin_slot: i32,
-}
-
-impl PhotonSelection {
-    /// The place of a photon's window.
-    #[inline(always)]
-    pub(super) fn place(&self, place: u32) -> u32 {
-        place + (self.later << SPAD_BITS)
     }
 }
 

@@ -16,10 +16,11 @@
 
 use smallvec::SmallVec;
 
-use super::binning::{Binning, PhotonSelection, Scratch};
+use super::binning::{Binning, Scratch};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
 use super::past::PastDraws;
+use super::photon_selection::PhotonSelection;
 use super::pulses::Window;
 use super::sight::{ROUNDING_FS, Sight, Spans};
 use super::table;

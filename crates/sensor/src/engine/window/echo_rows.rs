@@ -17,8 +17,8 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::binning::PhotonSelection;
 use super::codes::Code;
+use super::photon_selection::PhotonSelection;
 use super::sight::ROUNDING_FS;
 use crate::photon::{LANES, PixelStream, RANKS, signal_rank};
 

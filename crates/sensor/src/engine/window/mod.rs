@@ -14,6 +14,7 @@ mod codes;
 mod counting;
 mod echo_rows;
 mod past;
+mod photon_selection;
 mod pulses;
 mod row_ranks;
 mod sight;
