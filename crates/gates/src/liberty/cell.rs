@@ -6,13 +6,14 @@
 
 use std::collections::BTreeSet;
 
-use super::complete::{self, Remark};
+use super::complete;
 use super::error::LibertyError;
 pub(crate) use super::flip_flop::FlipFlop;
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
 use super::kit::LibraryFile;
 use super::leakage::leakage_of;
+use super::remark::CellRemark;
 use super::table::Table;
 use crate::netlist::{CheckKind, Edge};
 
@@ -194,7 +195,7 @@ pub(super) struct CellModel {
     pub checks: Vec<CellCheck>,
     pub energies: Vec<CellEnergy>,
     /// What it does not state, and what it states that is not used here.
-    pub remarks: Vec<Remark>,
+    pub remarks: Vec<CellRemark>,
 }
 
 impl CellModel {
@@ -210,7 +211,6 @@ impl CellModel {
         let units = file.units;
         let group = candidate.group;
         let pin = |name: &str| group.pin(name).expect("a candidate's pin");
-        let fault = |line: usize, message: String| LibertyError { line, message };
         complete::check_area_and_names(candidate)?;
         let load = |name: &str, missing: Option<f64>| {
             let loads = complete::capacitance(name, pin(name), missing)?;
@@ -231,8 +231,8 @@ impl CellModel {
             remarks: Vec::new(),
         };
         let unstated = [
-            (group.value("area").is_none(), Remark::NoArea),
-            (leakage.is_none(), Remark::NoLeakage),
+            (group.value("area").is_none(), CellRemark::NoArea),
+            (leakage.is_none(), CellRemark::NoLeakage),
         ];
         let unstated = unstated.into_iter().filter(|(is_missing, _)| *is_missing);
         model.remarks.extend(unstated.map(|(_, remark)| remark));
@@ -246,7 +246,7 @@ impl CellModel {
             let name = name.to_owned();
             model.inputs.push(InputPin { name, load_ff });
             if group.value("min_period").is_some() {
-                model.remark(Remark::Period);
+                model.remark(CellRemark::PeriodNotUsed);
             }
             for (attribute, kind, edge) in [
                 ("min_pulse_width_high", PulseWidth::High, Edge::Rise),
@@ -283,22 +283,22 @@ impl CellModel {
             }
         }
         if model.energies.is_empty() {
-            model.remark(Remark::NoEnergy);
+            model.remark(CellRemark::NoEnergy);
         }
         match model.role {
             Role::Gate(function) => complete::check_gate(&model, function)
-                .map_err(|message| fault(group.line, message))?,
+                .map_err(|fault| LibertyError::new(group.line, fault))?,
             Role::FlipFlop(_) => {
                 let missing = complete::missing_limits(&model);
                 if !missing.is_empty() {
-                    model.remark(Remark::NoLimits(missing));
+                    model.remark(CellRemark::NoLimits(missing));
                 }
             }
         }
         Ok(model)
     }
 
-    fn remark(&mut self, remark: Remark) {
+    fn remark(&mut self, remark: CellRemark) {
         if !self.remarks.contains(&remark) {
             self.remarks.push(remark);
         }
@@ -323,7 +323,7 @@ impl CellModel {
             let tables = [rise, fall];
             self.energies.push(CellEnergy { to, from, tables });
         } else {
-            self.remark(Remark::Energy);
+            self.remark(CellRemark::EnergyNotUsed);
         }
     }
 
@@ -425,7 +425,7 @@ impl CellModel {
                 return Ok(());
             }
             "minimum_period" => {
-                self.remark(Remark::Period);
+                self.remark(CellRemark::PeriodNotUsed);
                 return Ok(());
             }
             _ => return Ok(()),

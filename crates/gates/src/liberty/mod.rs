@@ -21,6 +21,8 @@
 //! | `units` | what a file's numbers are in |
 //! | `cell` | which cells may be chosen, and their tables |
 //! | `passed_over` | the others, and why |
+//! | `error`, `syntax_fault`, `table_fault` | what can be wrong |
+//! | `remark` | what is odd, or was put together |
 //! | `flip_flop` | what a flip-flop's pins do, and which are tied |
 //! | `leakage` | what a cell leaks |
 //! | `complete` | what a cell must state, and what it leaves out |
@@ -52,7 +54,10 @@ mod mapped_wires;
 mod mapping;
 mod passed_over;
 mod read;
+mod remark;
+mod syntax_fault;
 mod table;
+mod table_fault;
 mod text;
 mod units;
 mod verilog_name;
@@ -60,13 +65,15 @@ mod verilog_name;
 #[cfg(feature = "yosys")]
 pub(crate) use cell::{CellFunction, Role};
 pub use characterised::{CharacterisedNetlist, Environment};
-pub use error::{KitError, LibertyError};
+pub use error::{KitError, LibertyError, LibertyFault, PassedOver, PassedOverReason};
 #[cfg(feature = "yosys")]
 pub(crate) use function::TruthTable;
 pub use mapped_models::write_mapped_cells;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};
 pub use mapped_verilog::write_mapped;
 pub use mapping::CellMap;
-pub use passed_over::PassedOver;
 pub use read::Liberty;
+pub use remark::{CellRemark, LibraryRemark, MadeOf};
+pub use syntax_fault::LibertySyntaxFault;
+pub use table_fault::{LibertyTableFault, LibertyUnit};
 pub use text::liberty_text;

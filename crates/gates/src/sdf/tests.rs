@@ -3,7 +3,6 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::InputError;
 use crate::netlist::{
     CellId, CellKind, Library, ModuleBuilder, Netlist, OwnDelay, ScopeId, Timing,
 };
@@ -61,7 +60,7 @@ pub(super) fn file(body: &str) -> String {
 }
 
 /// `body` annotated in the typical corner, and delays (rise, fall; fs) of one pin of a cell.
-pub(super) fn annotated(body: &str) -> Result<(Netlist, Timing, Annotation), crate::InputError> {
+pub(super) fn annotated(body: &str) -> Result<(Netlist, Timing, Annotation), SdfError> {
     let netlist = design();
     let mut timing = nominal(&netlist, Corner::Typ);
     let text = file(body);
@@ -185,7 +184,7 @@ fn stages_of_a_chain_add_up_to_its_cell() {
             Corner::Typ,
         )?;
         let arc = timing.cell_delays(CellId::new(0))[0][0];
-        Ok::<_, InputError>((arc.rise_fs, arc.fall_fs))
+        Ok::<_, SdfError>((arc.rise_fs, arc.fall_fs))
     };
     let stage = |number: u32, cell_type: &str, entry: &str| {
         let delays = format!("(DELAY {entry})");
@@ -250,7 +249,11 @@ fn what_is_not_modelled_is_counted() {
             (HOLD (COND B A) (posedge B) (2)) (SETUP A B (1) ) ))",
     );
     let sdf = Sdf::parse("a.sdf", &text).unwrap();
-    let counts: Vec<_> = sdf.skipped.iter().map(|s| (s.what, s.count)).collect();
+    let counts: Vec<_> = sdf
+        .skipped
+        .iter()
+        .map(|s| (s.what.name(), s.count))
+        .collect();
     assert_eq!(
         counts,
         [
@@ -390,9 +393,10 @@ fn mistakes_are_named_with_line_and_cure() {
         let error = Sdf::parse("a.sdf", &text)
             .and_then(|sdf| annotate(&mut timing, &netlist, &sdf, Corner::Typ))
             .expect_err(&text);
-        assert_eq!(error.line, Some(line), "{text}: {error}");
+        assert_eq!(error.line, line, "{text}: {error}");
+        let message = error.fault.to_string();
         assert!(
-            error.message.contains(says) && error.message.contains(';'),
+            message.contains(says) && message.contains(';'),
             "{text}: {error}"
         );
     }

@@ -67,6 +67,11 @@ fn map(cells: &str, wanted: &[(CellKind, String)]) -> Result<CellMap, LibertyErr
     Liberty::read(&format!("{HEAD}{cells}}}"), wanted).map(|library| library.map)
 }
 
+/// What is odd about a library, one sentence each.
+fn sentences(map: &CellMap) -> Vec<String> {
+    map.remarks.iter().map(LibraryRemark::to_string).collect()
+}
+
 /// An inverter, a NAND and flip-flops: enough for everything.
 fn enough_cells() -> String {
     gate_text("INV_1", 1.0, &["A"], "!A")
@@ -177,16 +182,14 @@ fn wanted_cells_are_taken_and_must_do_what_is_wanted() {
     );
     let fault = map(&gates, &wanted(CellKind::Nor2, "NAND_1")).unwrap_err();
     assert!(
-        fault.message.contains("NAND_1 that does what NOR2 does"),
+        fault
+            .to_string()
+            .contains("NAND_1 that does what NOR2 does"),
         "{}",
-        fault.message
+        fault
     );
     let fault = map(&gate_text("INV_1", 1.0, &["A"], "!A"), &[]).unwrap_err();
-    assert!(
-        fault.message.contains("nothing to make a"),
-        "{}",
-        fault.message
-    );
+    assert!(fault.to_string().contains("nothing to make a"), "{}", fault);
 }
 
 /// Leakage, area and loads, in every unit that a file may have.
@@ -222,7 +225,7 @@ fn units_of_leakage_and_load_are_those_of_the_file() {
     assert!(
         read("1nA", "(1, pf)")
             .unwrap_err()
-            .message
+            .to_string()
             .contains("\"1nA\"")
     );
     let loads = ["(10, ff)", "(1, pf)"].map(|load| {
@@ -328,24 +331,25 @@ fn cells_that_lack_something_are_refused_with_their_line() {
         assert_ne!(bad, small);
         let found = map(&format!("\n{bad}{good}{rest}"), &[]).unwrap();
         assert_eq!(found.cells(CellKind::Inv), ["INV_2"], "{to}");
-        let told = found.odd.iter().find(|sentence| sentence.contains(says));
-        let told = told.unwrap_or_else(|| panic!("{to}: {:?}", found.odd));
+        let remarks = sentences(&found);
+        let told = remarks.iter().find(|sentence| sentence.contains(says));
+        let told = told.unwrap_or_else(|| panic!("{to}: {remarks:?}"));
         assert!(
             told.starts_with("line 3: INV") && told.contains("is not used"),
             "{told}"
         );
         let fault = map(&format!("\n{bad}{rest}"), &[]).unwrap_err();
         assert!(
-            fault.message.contains("an inverter would be enough"),
+            fault.to_string().contains("an inverter would be enough"),
             "{}",
-            fault.message
+            fault
         );
-        assert!(fault.message.contains(says), "{}", fault.message);
+        assert!(fault.to_string().contains(says), "{fault}");
     }
     let bad = small.replacen("cell_fall", "gone", 1);
     let wanted = [(CellKind::Inv, "INV_1".to_owned())];
     let fault = map(&format!("\n{bad}{good}{rest}"), &wanted).unwrap_err();
-    assert_eq!(fault.line, 3, "{}", fault.message);
+    assert_eq!(fault.line, 3, "{fault}");
     // Flip-flops, by the pins that are used.
     let gates =
         gate_text("INV_1", 1.0, &["A"], "!A") + &gate_text("NAND_1", 2.0, &["A", "B"], "!(A B)");
@@ -364,7 +368,7 @@ fn cells_that_lack_something_are_refused_with_their_line() {
             &(gates.clone() + &bad),
             &[(CellKind::Dffr, "DN_1".to_owned())],
         );
-        let message = found.unwrap_err().message;
+        let message = found.unwrap_err().to_string();
         assert!(message.contains(says), "{message}");
     }
 }
@@ -394,7 +398,7 @@ fn the_message_names_what_would_be_enough() {
             "a flip-flop with an asynchronous clear or preset",
         ),
     ] {
-        let message = map(&cells, &[]).unwrap_err().message;
+        let message = map(&cells, &[]).unwrap_err().to_string();
         let expected = format!("nothing to make a {kind} from; {says}");
         assert!(
             message.contains(&expected) || message.contains(says),
@@ -410,8 +414,8 @@ fn the_message_names_what_would_be_enough() {
 /// What is not stated, or stated and not used, is told with the cells.
 #[test]
 fn what_is_missing_or_not_used_is_told() {
-    let odd = |cells: &str| map(cells, &[]).unwrap().odd.join("\n");
-    let told = odd(&enough_cells());
+    let remarks = |cells: &str| sentences(&map(cells, &[]).unwrap()).join("\n");
+    let told = remarks(&enough_cells());
     for says in [
         "no leakage is stated for INV_1, NAND_1, DSR_1; it counts as 0",
         "no internal_power is stated for INV_1, NAND_1, DSR_1; it counts as 0",
@@ -425,7 +429,7 @@ fn what_is_missing_or_not_used_is_told() {
         .replacen("area : 1;", "", 1)
         .replacen("function : \"!A\";", "function : \"!A\"; internal_power () { rise_power (three) { values (\"1\"); } }", 1)
         .replacen("pin (CK) { direction : input;", "pin (CK) { direction : input; min_period : 1; timing () { timing_type : setup_rising; related_pin : \"CK\"; rise_constraint (scalar) { values (\"0.1\"); } }", 1);
-    let told = odd(&format!("{power}{cells}"));
+    let told = remarks(&format!("{power}{cells}"));
     for says in [
         "no area is stated for INV_1; it counts as 0",
         "internal_power that is no table over a slew and a load is not used, in INV_1",
@@ -443,11 +447,8 @@ fn what_is_missing_or_not_used_is_told() {
         found.recipe(CellKind::Inv).stages[0].drives[0].leakage_w,
         3.0 * 1e-9
     );
-    assert!(
-        !found.odd.join("\n").contains("leakage is stated for INV_1"),
-        "{:?}",
-        found.odd
-    );
+    let told = sentences(&found).join("\n");
+    assert!(!told.contains("leakage is stated for INV_1"), "{told}");
     let by_default = Liberty::read(
         &format!(
             "{HEAD} default_cell_leakage_power : 4; {}}}",
@@ -460,7 +461,8 @@ fn what_is_missing_or_not_used_is_told() {
         map.recipe(CellKind::Inv).stages[0].drives[0].leakage_w,
         4.0 * 1e-9
     );
-    assert!(!map.odd.join("\n").contains("leakage"), "{:?}", map.odd);
+    let told = sentences(&map).join("\n");
+    assert!(!told.contains("leakage"), "{told}");
 }
 
 /// Files of one kit are one library, each in its own units.
@@ -508,7 +510,7 @@ fn several_files_are_one_library() {
         ("library (x) {".to_owned(), 1, "no closing brace"),
     ] {
         let fault = read(&text).unwrap_err();
-        assert_eq!((fault.file, fault.fault.line), (1, line), "{fault}");
+        assert_eq!((fault.file, fault.error.line), (1, line), "{fault}");
         assert!(fault.to_string().contains(says), "{fault}");
     }
 }
