@@ -1,10 +1,10 @@
 //! What a cell must state, so that nothing that is missing counts as zero; and what it leaves out or states in vain, for the user to know.
 
-use super::cell::{Candidate, CellModel, FlipFlop, Role};
+use super::candidate::{Candidate, FlipFlop, Role};
+use super::cell::CellModel;
 use super::error::{LibertyError, LibertyFault};
 use super::function::TruthTable;
 use super::group::Group;
-use super::syntax_fault::LibertySyntaxFault;
 use super::verilog_name::is_possible;
 use crate::netlist::{CheckKind, Edge};
 
@@ -135,83 +135,4 @@ pub(super) fn capacitance(
         }
     }
     Ok(loads)
-}
-
-/// Checks that an attribute, if it is there, is one of these words.
-///
-/// # Errors
-/// Another one.
-pub(super) fn check_word(
-    group: &Group<'_>,
-    attribute: &'static str,
-    known: &'static [&'static str],
-) -> Result<(), LibertyError> {
-    match group.value(attribute) {
-        Some(word) if !known.contains(&word) => {
-            let word = word.to_owned();
-            let fault = LibertySyntaxFault::UnknownWord {
-                attribute,
-                word,
-                known,
-            };
-            Err(LibertyError::new(group.line, fault))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// What a `timing` group is of.
-///
-/// # Errors
-/// A word that is not in the Liberty manual.
-pub(super) fn timing_type<'t>(timing: &Group<'t>) -> Result<&'t str, LibertyError> {
-    let word = timing.value("timing_type").unwrap_or("combinational");
-    let begins = [
-        "combinational",
-        "three_state_disable",
-        "three_state_enable",
-        "setup",
-        "hold",
-        "recovery",
-        "removal",
-        "skew",
-        "non_seq_setup",
-        "non_seq_hold",
-    ];
-    let with_edge = begins.into_iter().any(|begin| {
-        matches!(
-            word.strip_prefix(begin),
-            Some("_rising" | "_falling" | "_rise" | "_fall" | "")
-        )
-    });
-    let others = [
-        "rising_edge",
-        "falling_edge",
-        "clear",
-        "preset",
-        "min_pulse_width",
-        "minimum_period",
-        "max_clock_tree_path",
-        "min_clock_tree_path",
-        "nochange_high_high",
-        "nochange_high_low",
-        "nochange_low_high",
-        "nochange_low_low",
-    ];
-    if with_edge || others.contains(&word) {
-        return Ok(word);
-    }
-    let word = word.to_owned();
-    let fault = LibertySyntaxFault::UnknownTimingType { word };
-    Err(LibertyError::new(timing.line, fault))
-}
-
-/// Which edge of the input makes which of the output, where a `timing` group says so.
-///
-/// # Errors
-/// A word that is not in the Liberty manual.
-pub(super) fn timing_sense<'t>(timing: &Group<'t>) -> Result<Option<&'t str>, LibertyError> {
-    let known = &["positive_unate", "negative_unate", "non_unate"];
-    check_word(timing, "timing_sense", known)?;
-    Ok(timing.value("timing_sense"))
 }

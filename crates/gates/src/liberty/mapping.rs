@@ -18,7 +18,8 @@ use crate::nearest;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use super::cell::{Candidate, CellModel, FlipFlop, Role};
+use super::candidate::{Candidate, FlipFlop, Role};
+use super::cell::CellModel;
 use super::error::{KitError, LibertyError, LibertyFault, PassedOver};
 use super::function::TruthTable;
 use super::kit::LibraryFile;

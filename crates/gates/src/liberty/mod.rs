@@ -19,7 +19,9 @@
 //! | `function` | Boolean expressions as truth tables |
 //! | `table` | delays, slews and limits over slew and load |
 //! | `units` | what a file's numbers are in |
-//! | `cell` | which cells may be chosen, and their tables |
+//! | `candidate` | which cells may be chosen |
+//! | `cell`, `read_cell` | a chosen cell with its tables |
+//! | `words` | attributes that are one of a few words |
 //! | `passed_over` | the others, and why |
 //! | `error`, `syntax_fault`, `table_fault` | what can be wrong |
 //! | `remark` | what is odd, or was put together |
@@ -37,6 +39,7 @@
 //! | `mapped_timing` | its delays and clocks for them |
 //! | `mapped_wires` | loads of its wires for them |
 
+mod candidate;
 mod cell;
 mod characterised;
 mod complete;
@@ -54,6 +57,7 @@ mod mapped_wires;
 mod mapping;
 mod passed_over;
 mod read;
+mod read_cell;
 mod remark;
 mod syntax_fault;
 mod table;
@@ -61,9 +65,10 @@ mod table_fault;
 mod text;
 mod units;
 mod verilog_name;
+mod words;
 
 #[cfg(feature = "yosys")]
-pub(crate) use cell::{CellFunction, Role};
+pub(crate) use candidate::{CellFunction, Role};
 pub use characterised::{CharacterisedNetlist, Environment};
 pub use error::{KitError, LibertyError, LibertyFault, PassedOver, PassedOverReason};
 #[cfg(feature = "yosys")]

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use super::cell::{Candidate, Role};
+use super::candidate::{Candidate, Role};
 use super::error::{LibertyFault, PassedOver, PassedOverReason as Reason};
 use super::flip_flop::{MAX_PINS, control_pin, shown_states};
 use super::function::TruthTable;

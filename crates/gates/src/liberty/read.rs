@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::cell::{Candidate, CellFunction, Role};
+use super::candidate::{Candidate, CellFunction, Role};
 use super::error::{KitError, LibertyError, PassedOver};
 use super::group;
 use super::kit::{self, LibraryFile};

@@ -11,7 +11,8 @@
 //! chosen to keep. That is eight of the smallest inverter's kind on the smallest inverter. A larger cell is a drive of its own only if it
 //! is stronger. So cells that delay on purpose are none.
 
-use super::super::cell::{Candidate, CellModel, Role};
+use super::super::candidate::{Candidate, Role};
+use super::super::cell::CellModel;
 use super::super::error::{LibertyError, PassedOver, PassedOverReason};
 use super::{Maker, Source, Stage, gate_function, order};
 use crate::liberty::function::TruthTable;

@@ -10,7 +10,7 @@
 //! A flip-flop may stand for one of the inverse state, with clear and preset exchanged. Our reset wins over the set; so a cell whose
 //! preset wins stands for the inverse state.
 
-use super::super::cell::{Candidate, FlipFlop, Role};
+use super::super::candidate::{Candidate, FlipFlop, Role};
 use super::super::complete::check_flip_flop;
 use super::super::error::LibertyError;
 use super::super::remark::LibraryRemark;

@@ -1,5 +1,6 @@
 //! Which flip-flop is taken, what is put around it, and what it does while set and reset are both active.
 
+use super::sentences::sentences;
 use super::*;
 
 #[test]
