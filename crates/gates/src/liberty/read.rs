@@ -47,7 +47,7 @@ impl Liberty {
     /// # Example
     ///
     /// ```
-    /// use femtogate::liberty::Liberty;
+    /// use femtogate::liberty::{Liberty, LibertyFault, LibertyTableFault, LibertyUnit};
     /// use femtogate::netlist::CellKind;
     ///
     /// let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/three_cells.lib");
@@ -56,7 +56,11 @@ impl Liberty {
     /// assert_eq!(library.name, "three_cells");
     /// assert_eq!(library.map.cells(CellKind::And2), ["NAND", "INV"]);
     ///
-    /// let fault = Liberty::read(&text.replace("1ns", "1h"), &[]).unwrap_err();
+    /// let error = Liberty::read(&text.replace("1ns", "1h"), &[]).unwrap_err();
+    /// let unit = LibertyUnit::Time;
+    /// let text = "1h".to_owned();
+    /// let fault = LibertyTableFault::UnknownUnit { unit, text };
+    /// assert_eq!((error.line, error.fault), (1, LibertyFault::Table(fault.clone())));
     /// assert_eq!(
     ///     fault.to_string(),
     ///     "its time_unit is \"1h\"; give a number, a prefix and s, as in 1ns"

@@ -37,7 +37,7 @@ impl Annotation {
 ///
 /// # Errors
 /// Unknown instances, cell types and pins, wires between pins that are not connected, and sums that are
-/// negative or beyond 4.29 µs: line, reason and cure. `timing` is then only partly annotated.
+/// negative or beyond 4.29 µs, each with its line. `timing` is then only partly annotated.
 ///
 /// # Example
 ///
@@ -308,7 +308,7 @@ impl Annotator<'_, '_, '_> {
                 continue;
             }
             for (slot, (value, before)) in slot.iter_mut().zip(values) {
-                if let Some(fs) = value.in_corner_fs(self.corner).map(Time::as_fs) {
+                if let Some(fs) = value.in_corner(self.corner).map(Time::as_fs) {
                     *slot = Some(if delay.increment {
                         slot.unwrap_or(before as i64) + fs
                     } else {

@@ -66,7 +66,7 @@ impl Annotator<'_, '_, '_> {
             // Two limits are one for each of two slots; one limit may be for both.
             let of_slot = [0, check.kind.limits() - 1].map(|limit| check.limits[limit]);
             for (slot, limit) in slots.into_iter().zip(of_slot) {
-                let (Some(slot), Some(limit)) = (slot, limit.in_corner_fs(self.corner)) else {
+                let (Some(slot), Some(limit)) = (slot, limit.in_corner(self.corner)) else {
                     continue;
                 };
                 if limit < Time::ZERO {

@@ -85,7 +85,7 @@ impl Triple {
     }
 
     /// The member of one corner.
-    pub const fn in_corner_fs(self, corner: Corner) -> Option<Time> {
+    pub const fn in_corner(self, corner: Corner) -> Option<Time> {
         self.0[corner as usize]
     }
 }
@@ -132,7 +132,7 @@ impl SdfDelay<'_> {
     pub fn has_value(&self, corner: Corner) -> bool {
         [self.rise, self.fall]
             .iter()
-            .any(|value| value.in_corner_fs(corner).is_some())
+            .any(|value| value.in_corner(corner).is_some())
     }
 }
 
@@ -209,7 +209,7 @@ impl SdfCheck<'_> {
     pub fn has_value(&self, corner: Corner) -> bool {
         self.limits
             .iter()
-            .any(|limit| limit.in_corner_fs(corner).is_some())
+            .any(|limit| limit.in_corner(corner).is_some())
     }
 }
 

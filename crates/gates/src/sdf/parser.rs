@@ -26,7 +26,20 @@ impl<'a> Sdf<'a> {
     /// Reads a delay file; `source` names it in complaints.
     ///
     /// # Errors
-    /// What is malformed or of an unknown kind: line, reason and cure.
+    /// What is malformed or of an unknown kind, with its line.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::sdf::{Sdf, SdfFault};
+    ///
+    /// let error = Sdf::parse("layout.sdf", "(DELAYFILE\n  (DIVIDER x))").unwrap_err();
+    /// assert_eq!((error.line, &error.fault), (2, &SdfFault::UnknownDivider));
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "layout.sdf:2: the divider is neither . nor /; choose one of the two"
+    /// );
+    /// ```
     pub fn parse(source: &str, text: &'a str) -> Result<Self> {
         let mut parser = Parser {
             source,

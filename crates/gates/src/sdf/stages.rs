@@ -40,7 +40,7 @@ impl Annotator<'_, '_, '_> {
             });
             *line = delay.line;
             for (member, value) in stages[number].iter_mut().zip([delay.rise, delay.fall]) {
-                if let Some(fs) = value.in_corner_fs(self.corner).map(Time::as_fs) {
+                if let Some(fs) = value.in_corner(self.corner).map(Time::as_fs) {
                     *member = fs + if delay.increment { *member } else { 0 };
                 }
             }

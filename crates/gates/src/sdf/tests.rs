@@ -171,7 +171,13 @@ fn delays_by_edge_go_where_the_edge_leads() {
 fn stages_of_a_chain_add_up_to_its_cell() {
     let mut m = ModuleBuilder::new("chip");
     let (a, z) = (m.input("A"), m.output("Z"));
-    m.cell_with_delay("line", CellKind::Buf, &[a], &[z], OwnDelay::wire(2_600_001));
+    m.cell_with_delay(
+        "line",
+        CellKind::Buf,
+        &[a],
+        &[z],
+        OwnDelay::wire(Time::from_fs(2_600_001)),
+    );
     let netlist = Netlist::elaborate(&m.finish().unwrap());
     let nominal = |corner| Timing::nominal(&netlist, &Library::generic_40nm(), corner);
     let delay = |body: &str| {

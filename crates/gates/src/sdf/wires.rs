@@ -65,7 +65,7 @@ impl Annotator<'_, '_, '_> {
 
     pub(super) fn wire(&mut self, cell: CellId, pin: usize, delay: &SdfDelay<'_>) {
         let kind = self.netlist.cells()[cell.index()].kind;
-        let values = [delay.rise, delay.fall].map(|triple| triple.in_corner_fs(self.corner));
+        let values = [delay.rise, delay.fall].map(|triple| triple.in_corner(self.corner));
         if !kind.triggers(pin) {
             let longest = values.into_iter().flatten().max().unwrap_or_default();
             let longest = self.result.longest_wire_to_d.max(longest);

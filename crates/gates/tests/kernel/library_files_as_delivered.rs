@@ -144,7 +144,7 @@ fn capacitance_of_outputs_is_a_load() {
         };
         let made = CharacterisedNetlist::new(&netlist, &library, &environment);
         let arc = made.timing.cell_delays(CellId::new(0))[0][0];
-        [arc.rise_fs, arc.fall_fs].map(f64::from)
+        [arc.rise(), arc.fall()].map(|delay| delay.as_fs() as f64)
     };
     let before = delays(&text());
     let with = "pin (Y) {\n    capacitance : 0.01;";

@@ -19,7 +19,7 @@ use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::files::instead_of;
 use crate::liberty::{CharacterisedNetlist, Environment, Liberty};
-use crate::netlist::{CellKind, Corner, Library, Module, Netlist, ScopeId, Timing};
+use crate::netlist::{ArcDelay, CellKind, Corner, Library, Module, Netlist, ScopeId, Timing};
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.
 #[derive(Debug, Clone, Copy)]
@@ -181,8 +181,8 @@ impl FromFile {
             let cell = cells.nth(toggle).expect("a cell of the module");
             let mut delays = *timing.cell_delays(cell);
             for arc in delays.as_flattened_mut() {
-                let slower = arc.rise_fs.max(arc.fall_fs);
-                (arc.rise_fs, arc.fall_fs) = (slower, slower);
+                let slower = arc.rise().max(arc.fall());
+                *arc = ArcDelay::new(slower, slower);
             }
             timing.set(cell, delays);
         }
