@@ -194,7 +194,7 @@ pub(super) fn annotated_timing(
 /// Why nothing of a file was taken over, and what to do.
 fn why_unused(sdf: &Sdf<'_>, corner: Corner, result: &Annotation) -> String {
     let left_out = |skipped: &[SkippedEntry]| {
-        let names: Vec<&str> = skipped.iter().map(|skipped| skipped.what).collect();
+        let names: Vec<&str> = skipped.iter().map(|skipped| skipped.what.name()).collect();
         names.join(", ")
     };
     if sdf.cells.is_empty() {

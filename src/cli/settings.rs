@@ -117,7 +117,7 @@ impl SensorArgs {
     fn warn_of_unusual(&self, sensor: &SensorConfig) {
         let library = CellLibrary::from_config(sensor).ok();
         if let Some(library) = library.and_then(CellLibrary::from_file) {
-            library.liberty.map.odd.iter().for_each(note);
+            library.remarks.iter().for_each(note);
         }
         if self.chip() == "hslidar" && sensor.clk_hz > HSLIDAR_MOST_HZ {
             note(format_args!(

@@ -145,11 +145,7 @@ impl Tdc {
             .enumerate()
             .filter(|(_, cell)| cell.kind == CellKind::Inv);
         let (inverter, _) = inverters.next().expect("it inverts CLK");
-        let late = Time::from_fs(
-            self.timing.cell_delays(CellId::new(inverter))[0][0]
-                .delay_fs(Logic::One)
-                .into(),
-        );
+        let late = self.timing.cell_delays(CellId::new(inverter))[0][0].rise();
         let first = (from.as_s() * clock.as_hz()) as i64 - 2;
         let falls = (first..).map(move |k| clock.half_periods(2 * k + 1) + late);
         falls.take_while(move |&fall| fall < to)

@@ -6,7 +6,9 @@ use guided_dtof::chip::{
 };
 use guided_dtof::engine::{self as fast, Cancelling, Cycle, Gate, GateSimulation, Replay};
 use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, Stimulus, TimingChecks, clock};
-use guided_dtof::netlist::{CellKind, CheckKind, Corner, Library, NetId, Netlist, Timing};
+use guided_dtof::netlist::{
+    ArcDelay, CellKind, CheckKind, Corner, Library, NetId, Netlist, Timing,
+};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::stimulus::{HardwareEventKind, HardwareEvents};
 use guided_dtof::units::{Frequency, Time};
@@ -303,8 +305,8 @@ fn shortened(netlist: &Netlist, factor: f64) -> Timing {
         if netlist.cells()[cell.index()].kind == CellKind::Buf {
             let mut delays = *timing.cell_delays(cell);
             for arc in delays.as_flattened_mut() {
-                arc.rise_fs = (arc.rise_fs as f64 * factor) as u32;
-                arc.fall_fs = (arc.fall_fs as f64 * factor) as u32;
+                let scaled = |time: Time| Time::from_fs((time.as_fs() as f64 * factor) as i64);
+                *arc = ArcDelay::new(scaled(arc.rise()), scaled(arc.fall()));
             }
             timing.set(cell, delays);
         }

@@ -127,10 +127,10 @@ fn compare(mapped: &MappedChip, seed: u64) -> (usize, usize) {
 
     let slowest = mapped.netlist.cells_below(ScopeId::TOP).flat_map(|cell| {
         let arcs = timing.cell_delays(cell).as_flattened().iter();
-        arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
+        arcs.map(|arc| arc.rise().max(arc.fall()))
             .collect::<Vec<_>>()
     });
-    let slowest = 4 * u64::from(slowest.max().unwrap());
+    let slowest = 4 * slowest.max().unwrap().as_fs() as u64;
     let mut wrong: BTreeMap<u64, String> = BTreeMap::new();
     let (mut edges, mut off, mut exact) = (0, 0, 0);
     let is_adder = |name: &str| name.contains("correlation") || name.ends_with("SPAD_EVENT");

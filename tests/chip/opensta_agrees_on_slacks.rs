@@ -230,7 +230,7 @@ fn ours(mapped: &MappedChip) -> Checks {
         let (kind, edge) = (requirement.kind, requirement.edge);
         let leaf = &netlist.cells()[requirement.cell.index()];
         let limits = timing.limits(requirement.cell, leaf.kind);
-        let limit = f64::from(limits.limit_fs(Control::Reset, kind, edge)) * 1e-6;
+        let limit = ns(limits.limit(Control::Reset, kind, edge));
         let arrivals = all.arrivals(requirement.launch);
         let window = arrivals.edge_window(leaf.input(0), edge);
         let window = window.map(|(first, last)| {
@@ -292,7 +292,7 @@ fn ours(mapped: &MappedChip) -> Checks {
                     let (Some((early, late)), Some((first, last))) = (clock, release) else {
                         continue;
                     };
-                    let limit = |kind| f64::from(limits.limit_fs(control, kind, Edge::Rise)) * 1e-6;
+                    let limit = |kind| ns(limits.limit(control, kind, Edge::Rise));
                     let needs = [
                         ("recovery", ns(last - early) + limit(CheckKind::Recovery)),
                         ("removal", ns(late - first) + limit(CheckKind::Removal)),

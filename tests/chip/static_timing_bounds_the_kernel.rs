@@ -122,7 +122,7 @@ proptest! {
     #[test]
     fn random_circuits_stay_within_their_bounds(
         choices in prop::collection::vec((any::<usize>(), any::<[usize; 4]>(), any::<bool>()), 1..60),
-        delays in prop::collection::vec((1u32..90_000, 1u32..90_000), 1..64),
+        delays in prop::collection::vec((1i64..90_000, 1i64..90_000), 1..64),
         words in prop::collection::vec(0u64..128, 1..12),
     ) {
         let netlist = Netlist::elaborate(&random_circuit(&choices));
@@ -130,8 +130,8 @@ proptest! {
         let mut next = delays.iter().cycle();
         for cell in netlist.cells_below(ScopeId::TOP) {
             let mut arc = || {
-                let &(rise_fs, fall_fs) = next.next().expect("endless");
-                ArcDelay { rise_fs, fall_fs }
+                let &(rise, fall) = next.next().expect("endless");
+                ArcDelay::new(Time::from_fs(rise), Time::from_fs(fall))
             };
             timing.set(cell, std::array::from_fn(|_| [arc(), arc()]));
         }

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use bench::{SETTLING, corners};
 use guided_dtof::chip::tdc::{clock_counter, delay_line, ring_oscillator};
 use guided_dtof::kernel::{Drive, Kernel, Stimulus};
-use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
     CellId, CellKind, Corner, Library, Mismatch, Module, Netlist, Timing, varied,
 };
@@ -107,7 +106,7 @@ proptest! {
         let found = converter.convert("CODE", Some(period), &intervals);
         // NOT CLK rises so long after CLK falls.
         let inverter = converter.netlist.cells().iter().position(|c| c.kind == CellKind::Inv).unwrap();
- let late = Time::from_fs(converter.timing.cell_delays(CellId::new(inverter))[0][0].delay_fs(Logic::One).into());
+        let late = converter.timing.cell_delays(CellId::new(inverter))[0][0].rise();
         for (slot, (&interval, found)) in (0..).zip(intervals.iter().zip(found)) {
             let start = SLOT * slot + SETTLING * 2;
             let half = Time::from_fs(period.as_fs() / 2);

@@ -42,9 +42,8 @@ pub(super) fn cells(silicon: &Silicon) -> Result<[Section; 2], InputError> {
     let mut passed_over = Section::new("passed_over", title, columns);
     for cell in &liberty.passed_over {
         let line = SectionCell::Number(Some(cell.line as f64), 0);
-        let [name, file, why] =
-            [&cell.cell, &cell.file, &cell.why].map(|text| text.as_str().into());
-        passed_over.push([name, file, line, why]);
+        let [name, file] = [&cell.cell, &cell.file].map(|text| text.as_str().into());
+        passed_over.push([name, file, line, cell.why.to_string().into()]);
     }
     Ok([used, passed_over])
 }

@@ -284,8 +284,10 @@ mod tests {
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
         let set = DelaySet::all(&netlist, &timing).0[timing.set_of(CellId::new(0)) as usize];
-        let arc =
-            |pin: usize| library.arcs(CellKind::Mux2)[pin][0].delay_fs(Corner::Typ, Logic::One);
+        let arc = |pin: usize| {
+            let delay = library.delay(CellKind::Mux2, pin, Logic::One, Corner::Typ);
+            delay.as_fs() as u32
+        };
         let by_pins = |differing: u8| set.shortest_delays(differing, 0)[Logic::One as usize];
         assert_eq!(by_pins(0b00_00_01), arc(0));
         assert_eq!(by_pins(0b10_00_00), arc(2));

@@ -1,48 +1,12 @@
 //! What a cell must state, so that nothing that is missing counts as zero; and what it leaves out or states in vain, for the user to know.
 
-use super::cell::{Candidate, CellModel, FlipFlop, Role};
-use super::error::LibertyError;
+use super::candidate::{Candidate, FlipFlop, Role};
+use super::cell::CellModel;
+use super::error::{LibertyError, LibertyFault};
 use super::function::TruthTable;
 use super::group::Group;
 use super::verilog_name::is_possible;
 use crate::netlist::{CheckKind, Edge};
-
-/// Something to know of a cell that is used.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Remark {
-    NoArea,
-    NoLeakage,
-    NoEnergy,
-    NoLimits(Vec<CheckKind>),
-    /// Internal power that is no table over a slew and a load.
-    Energy,
-    /// A shortest period of the clock.
-    Period,
-}
-
-impl Remark {
-    /// A sentence of the cells that it is of.
-    pub(super) fn sentence(&self, cells: &str) -> String {
-        match self {
-            Remark::NoArea => format!("no area is stated for {cells}; it counts as 0"),
-            Remark::NoLeakage => format!("no leakage is stated for {cells}; it counts as 0"),
-            Remark::NoEnergy => {
-                format!("no internal_power is stated for {cells}; it counts as 0")
-            }
-            Remark::NoLimits(kinds) => {
-                let names = kinds.iter().map(|kind| kind.name().replace('_', " "));
-                let names = names.collect::<Vec<_>>().join(", ");
-                format!("no limits of {names} are stated for {cells}; they count as 0")
-            }
-            Remark::Energy => format!(
-                "internal_power that is no table over a slew and a load is not used, in {cells}"
-            ),
-            Remark::Period => format!(
-                "the shortest period of the clock is not used, in {cells}; widths of its pulses are"
-            ),
-        }
-    }
-}
 
 /// Limits that a flip-flop should state and does not.
 pub(super) fn missing_limits(model: &CellModel) -> Vec<CheckKind> {
@@ -65,7 +29,7 @@ pub(super) fn missing_limits(model: &CellModel) -> Vec<CheckKind> {
 ///
 /// # Errors
 /// The first edge without one.
-pub(super) fn check_gate(model: &CellModel, function: TruthTable) -> Result<(), String> {
+pub(super) fn check_gate(model: &CellModel, function: TruthTable) -> Result<(), LibertyFault> {
     for pin in 0..model.inputs.len() {
         let (same, inverse) = function.unate(pin as u32);
         for cause in Edge::BOTH {
@@ -86,7 +50,7 @@ pub(super) fn check_flip_flop(
     model: &CellModel,
     roles: &FlipFlop,
     with_set: bool,
-) -> Result<(), String> {
+) -> Result<(), LibertyFault> {
     use Edge::{Fall, Rise};
     let active = |(pin, inverted): (usize, bool)| (pin, if inverted { Fall } else { Rise });
     for (output, set) in [(roles.q, Rise), (roles.qn, Fall)] {
@@ -108,21 +72,19 @@ fn check_arc(
     model: &CellModel,
     (from, cause): (usize, Edge),
     (to, effect): (usize, Edge),
-) -> Result<(), String> {
+) -> Result<(), LibertyFault> {
     let mut arcs = model.arcs.iter();
     let is_there =
         arcs.any(|arc| (arc.from, arc.cause, arc.to, arc.effect) == (from, cause, to, effect));
     if is_there {
         return Ok(());
     }
-    let word = |edge| if edge == Edge::Rise { "rise" } else { "fall" };
-    Err(format!(
-        "it has no delay and slew from the {} of {} to the {} of {}",
-        word(cause),
-        model.inputs[from].name,
-        word(effect),
-        model.outputs[to].name
-    ))
+    Err(LibertyFault::NoDelay {
+        from: model.inputs[from].name.clone(),
+        cause,
+        to: model.outputs[to].name.clone(),
+        effect,
+    })
 }
 
 /// Checks that a cell's area is not negative, and that Verilog can have its names.
@@ -130,18 +92,19 @@ fn check_arc(
 /// # Errors
 /// What is not so, with the cell's line.
 pub(super) fn check_area_and_names(cell: &Candidate<'_, '_>) -> Result<(), LibertyError> {
-    let fault = |message: String| LibertyError {
-        line: cell.group.line,
-        message,
-    };
-    if cell.area < 0.0 {
-        return Err(fault(format!("its area is {}", cell.area)));
+    let fault = |fault| LibertyError::new(cell.group.line, fault);
+    let area = cell.area;
+    if area < 0.0 {
+        return Err(fault(LibertyFault::NegativeArea { area }));
     }
     let pins = cell.inputs.iter().chain(&cell.outputs).copied();
     let mut names = std::iter::once(cell.name()).chain(pins);
     match names.find(|name| !is_possible(name)) {
         None => Ok(()),
-        Some(name) => Err(fault(format!("Verilog can have no name like {name:?}"))),
+        Some(name) => {
+            let name = name.to_owned();
+            Err(fault(LibertyFault::NoVerilogName { name }))
+        }
     }
 }
 
@@ -154,10 +117,8 @@ pub(super) fn capacitance(
     pin: &Group<'_>,
     missing: Option<f64>,
 ) -> Result<[f64; 2], LibertyError> {
-    let fault = |message: String| LibertyError {
-        line: pin.line,
-        message,
-    };
+    let fault = |fault| LibertyError::new(pin.line, fault);
+    let pin_name = || name.to_owned();
     let either = pin.number("capacitance")?.or(missing);
     let mut loads = [0.0; 2];
     for (load, attribute) in loads
@@ -165,89 +126,13 @@ pub(super) fn capacitance(
         .zip(["rise_capacitance", "fall_capacitance"])
     {
         let stated = pin.number(attribute)?.or(either);
-        *load = stated.ok_or_else(|| fault(format!("its pin {name} has no capacitance")))?;
+        *load = stated.ok_or_else(|| fault(LibertyFault::NoCapacitance { pin: pin_name() }))?;
         if *load < 0.0 {
-            let message = format!("the capacitance of its pin {name} is {load}");
-            return Err(fault(message));
+            return Err(fault(LibertyFault::NegativeCapacitance {
+                pin: pin_name(),
+                capacitance: *load,
+            }));
         }
     }
     Ok(loads)
-}
-
-/// Checks that an attribute, if it is there, is one of these words.
-///
-/// # Errors
-/// Another one.
-pub(super) fn check_word(
-    group: &Group<'_>,
-    attribute: &str,
-    words: &[&str],
-) -> Result<(), LibertyError> {
-    match group.value(attribute) {
-        Some(word) if !words.contains(&word) => Err(LibertyError {
-            line: group.line,
-            message: format!(
-                "{attribute} {word:?} is not known: it is {}",
-                words.join(", ")
-            ),
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// What a `timing` group is of.
-///
-/// # Errors
-/// A word that is not in the Liberty manual.
-pub(super) fn timing_type<'t>(timing: &Group<'t>) -> Result<&'t str, LibertyError> {
-    let word = timing.value("timing_type").unwrap_or("combinational");
-    let begins = [
-        "combinational",
-        "three_state_disable",
-        "three_state_enable",
-        "setup",
-        "hold",
-        "recovery",
-        "removal",
-        "skew",
-        "non_seq_setup",
-        "non_seq_hold",
-    ];
-    let with_edge = begins.into_iter().any(|begin| {
-        matches!(
-            word.strip_prefix(begin),
-            Some("_rising" | "_falling" | "_rise" | "_fall" | "")
-        )
-    });
-    let others = [
-        "rising_edge",
-        "falling_edge",
-        "clear",
-        "preset",
-        "min_pulse_width",
-        "minimum_period",
-        "max_clock_tree_path",
-        "min_clock_tree_path",
-        "nochange_high_high",
-        "nochange_high_low",
-        "nochange_low_high",
-        "nochange_low_low",
-    ];
-    if with_edge || others.contains(&word) {
-        return Ok(word);
-    }
-    Err(LibertyError {
-        line: timing.line,
-        message: format!("timing_type {word:?} is not known"),
-    })
-}
-
-/// Which edge of the input makes which of the output, where a `timing` group says so.
-///
-/// # Errors
-/// A word that is not in the Liberty manual.
-pub(super) fn timing_sense<'t>(timing: &Group<'t>) -> Result<Option<&'t str>, LibertyError> {
-    let known = ["positive_unate", "negative_unate", "non_unate"];
-    check_word(timing, "timing_sense", &known)?;
-    Ok(timing.value("timing_sense"))
 }

@@ -7,7 +7,8 @@
 
 use std::collections::BTreeMap;
 
-use super::cell::{CellEnergy, CellModel, FlipFlop};
+use super::candidate::FlipFlop;
+use super::cell::{CellEnergy, CellModel};
 use super::mapping::{Recipe, Source};
 use crate::netlist::{
     ArcDelay, CellDelays, CellKind, CheckKind, Control, Edge, InstanceLimits, MAX_INPUTS,

@@ -8,10 +8,10 @@
 //! A cell whose next state is more than its data stands for a plain flip-flop once its other pins are tied to a level: the enable
 //! of a scan chain, a load enable, a synchronous reset.
 
-use super::complete::check_word;
 use super::error::LibertyError;
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
+use super::words::check_word;
 use crate::netlist::MAX_OUTPUTS;
 
 /// Inputs that a flip-flop can have here, most of which are tied.

@@ -24,6 +24,7 @@
 //! vendors are read as any others and mean nothing.
 
 use super::error::LibertyError;
+use super::syntax_fault::LibertySyntaxFault as Fault;
 
 /// A group, with where it begins.
 #[derive(Debug)]
@@ -86,12 +87,13 @@ impl<'t> Group<'t> {
 
     fn parse(&self, name: &str, text: &str) -> Result<f64, LibertyError> {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| LibertyError {
-            line: self.line,
-            message: format!(
-                "{name} of this {} is {text:?}, which is not a number",
-                self.kind
-            ),
+        number.ok_or_else(|| {
+            let fault = Fault::NotNumber {
+                attribute: name.to_owned(),
+                group: self.kind.to_owned(),
+                text: text.to_owned(),
+            };
+            LibertyError::new(self.line, fault)
         })
     }
 
@@ -126,19 +128,13 @@ pub(super) fn read(text: &str) -> Result<Group<'_>, LibertyError> {
     let first = reader.token()?;
     let library = match first {
         Some(Token::Word("library")) => reader.group("library", 0)?,
-        _ => {
-            return Err(
-                reader.fault("the file does not begin with library (NAME) {; give a Liberty file")
-            );
-        }
+        _ => return Err(reader.fault(Fault::NoLibrary)),
     };
     loop {
         match reader.token()? {
             None => return Ok(library),
             Some(Token::Mark(b';')) => {}
-            Some(_) => return Err(reader.fault(
-                "something follows the library's closing brace; remove it, or a brace before it",
-            )),
+            Some(_) => return Err(reader.fault(Fault::AfterLibrary)),
         }
     }
 }
@@ -159,11 +155,8 @@ struct Reader<'t> {
 }
 
 impl<'t> Reader<'t> {
-    fn fault(&self, message: impl Into<String>) -> LibertyError {
-        LibertyError {
-            line: self.line,
-            message: message.into(),
-        }
+    fn fault(&self, fault: Fault) -> LibertyError {
+        LibertyError::new(self.line, fault)
     }
 
     /// Passes over blanks, comments and continued lines.
@@ -177,7 +170,7 @@ impl<'t> Reader<'t> {
                 b'/' if bytes.get(self.at + 1) == Some(&b'*') => {
                     let rest = &self.text[self.at + 2..];
                     let Some(end) = rest.find("*/") else {
-                        return Err(self.fault("a comment has no end"));
+                        return Err(self.fault(Fault::UnclosedComment));
                     };
                     self.line += rest[..end].matches('\n').count();
                     self.at += end + 3;
@@ -238,7 +231,7 @@ impl<'t> Reader<'t> {
                     lines += 1;
                     length += 1;
                 }
-                None | Some(b'\n') => return Err(self.fault("a quotation mark has no partner")),
+                None | Some(b'\n') => return Err(self.fault(Fault::UnclosedString)),
                 Some(_) => length += 1,
             }
         }
@@ -261,7 +254,7 @@ impl<'t> Reader<'t> {
                 }
                 Some(b'"') => arguments.push(self.string()?),
                 None | Some(b'(' | b'{' | b'}' | b';') => {
-                    return Err(self.fault("a bracket has no partner"));
+                    return Err(self.fault(Fault::UnclosedBracket));
                 }
                 Some(_) => arguments.push(self.word("(){};,\"\\")),
             }
@@ -273,11 +266,13 @@ impl<'t> Reader<'t> {
         let line = self.line;
         let opens = self.token()? == Some(Token::Mark(b'('));
         if !opens {
-            return Err(self.fault(format!("{kind} has no arguments in brackets")));
+            let group = kind.to_owned();
+            return Err(self.fault(Fault::NoArguments { group }));
         }
         let arguments = self.arguments()?;
         if self.token()? != Some(Token::Mark(b'{')) {
-            return Err(self.fault(format!("{kind} has no contents in braces")));
+            let group = kind.to_owned();
+            return Err(self.fault(Fault::NoContents { group }));
         }
         self.contents(
             Group {
@@ -294,7 +289,7 @@ impl<'t> Reader<'t> {
     /// What is in a group's braces, of which the first is read.
     fn contents(&mut self, mut group: Group<'t>, depth: usize) -> Result<Group<'t>, LibertyError> {
         if depth > DEEPEST {
-            return Err(self.fault(format!("groups are more than {DEEPEST} deep")));
+            return Err(self.fault(Fault::TooDeep { most: DEEPEST }));
         }
         loop {
             let name = match self.token()? {
@@ -302,13 +297,15 @@ impl<'t> Reader<'t> {
                 Some(Token::Mark(b'}')) => return Ok(group),
                 Some(Token::Word(name)) => name,
                 Some(Token::Mark(mark)) => {
-                    return Err(self.fault(format!("{:?} is not expected here", char::from(mark))));
+                    let mark = char::from(mark);
+                    return Err(self.fault(Fault::UnexpectedMark { mark }));
                 }
                 None => {
-                    let (kind, name, line) = (group.kind, group.name(), group.line);
-                    return Err(self.fault(format!(
-                        "the {kind} {name} of line {line} has no closing brace; add it"
-                    )));
+                    return Err(self.fault(Fault::UnclosedGroup {
+                        group: group.kind.to_owned(),
+                        name: group.name().to_owned(),
+                        line: group.line,
+                    }));
                 }
             };
             let line = self.line;
@@ -332,10 +329,8 @@ impl<'t> Reader<'t> {
                         group.groups.push(inner);
                     } else if name == "include_file" {
                         let file = arguments.first().copied().unwrap_or_default();
-                        let message = format!(
-                            "what is in {file:?} is not included; put its text in the place of include_file"
-                        );
-                        return Err(LibertyError { line, message });
+                        let file = file.to_owned();
+                        return Err(LibertyError::new(line, Fault::NotIncluded { file }));
                     } else {
                         (self.at, self.line) = (at, before);
                         group.attributes.push((name, arguments));
@@ -344,7 +339,10 @@ impl<'t> Reader<'t> {
                 Some(Token::Mark(b'=')) => {
                     self.simple_value()?;
                 }
-                _ => return Err(self.fault(format!("{name} is neither an attribute nor a group"))),
+                _ => {
+                    let name = name.to_owned();
+                    return Err(self.fault(Fault::LoneName { name }));
+                }
             }
         }
     }
@@ -373,7 +371,8 @@ impl<'t> Reader<'t> {
             if byte == b':' {
                 let value = self.text[start..self.at].trim();
                 if self.line > line && is_attribute(value) {
-                    return Err(self.fault(format!("the attribute before {value} has no value")));
+                    let next = value.to_owned();
+                    return Err(self.fault(Fault::NoValue { next }));
                 }
                 if let Some(attribute) = last_name(&self.text[start..self.at]) {
                     self.at = start + attribute;
@@ -401,114 +400,4 @@ fn is_attribute(name: &str) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn groups_attributes_and_continued_lines_are_read() {
-        let text = "/* a\n b */ library (l) {\n  time_unit : \"1ns\";\n  area /* um2 */ : 3.5 ;\n  t (\"1, 2\", \\\n     \"3\");\n  cell (\"X\") { pin(A) { direction : input; } } // end\n}\n";
-        let library = read(text).unwrap();
-        assert_eq!((library.name(), library.line), ("l", 2));
-        assert_eq!(library.value("time_unit"), Some("1ns"));
-        assert_eq!(library.number("area").unwrap(), Some(3.5));
-        assert_eq!(library.numbers("t").unwrap(), Some(vec![1.0, 2.0, 3.0]));
-        let cell = library.of_kind("cell").next().unwrap();
-        assert_eq!((cell.name(), cell.line), ("X", 7));
-        assert_eq!(cell.groups[0].value("direction"), Some("input"));
-    }
-
-    #[test]
-    fn what_ends_a_value_is_no_part_of_it() {
-        let text = "library (l) {
-  a : clear /* x */;  b : 3 // y
-  c : rising_edge/* of
-  two lines */;
-  d : 1 e : 2;
-  f /* g */ : /* h */ \"i\" /* ; */ ;
-  j : 4 \\
-  ;
-  k : 12 May 12:30:00;
-  at : http://x;
-  t (1 /* a */, 2/* b */, /* c */3);
-  v = 1.5; w=2;
-  cell (X/* y */) { area : 1 } ;
-};;
-";
-        let library = read(text).unwrap();
-        for (name, value) in [
-            ("a", "clear"),
-            ("b", "3"),
-            ("c", "rising_edge"),
-            ("d", "1"),
-            ("e", "2"),
-            ("f", "i"),
-            ("j", "4"),
-            ("k", "12 May 12:30:00"),
-            ("at", "http://x"),
-        ] {
-            assert_eq!(library.value(name), Some(value), "{name}");
-        }
-        assert_eq!(library.values("t"), Some(&["1", "2", "3"][..]));
-        let cell = library.of_kind("cell").next().unwrap();
-        assert_eq!((cell.name(), cell.line), ("X", 13));
-        assert_eq!(cell.number("area").unwrap(), Some(1.0));
-    }
-
-    #[test]
-    fn names_have_colons_and_brackets_and_one_group_is_of_several_pins() {
-        let text = "library (l) { cell (a:b) {
-  pin (A[3:0]) { x : 1; }
-  pin (B, \"C\" D) { x : 2; }
-  when : \"\\\"1A\\\" & B\";
-} }";
-        let library = read(text).unwrap();
-        let cell = library.of_kind("cell").next().unwrap();
-        assert_eq!(cell.name(), "a:b");
-        assert_eq!(cell.value("when"), Some("\\\"1A\\\" & B"));
-        let pins: Vec<_> = cell
-            .pins()
-            .map(|(name, pin)| (name, pin.value("x")))
-            .collect();
-        let [one, two] = [Some("1"), Some("2")];
-        assert_eq!(pins, [("A[3:0]", one), ("B", two), ("C", two), ("D", two)]);
-    }
-
-    #[test]
-    fn what_is_no_liberty_is_told_with_its_line() {
-        for (text, line) in [
-            ("module x;", 1),
-            ("library (l) {\n cell (a) {\n", 3),
-            ("library (l) {\n a : \"b;\n}", 2),
-            ("library (l) {\n a b;\n}", 2),
-            ("library (l) { }\n}", 2),
-            ("library (l) { a (1 ; }", 1),
-            ("library (l) {\n a :\n b : 3;\n}", 3),
-            // A value has no comment within it.
-            ("library (l) {\n a : b /* c */ d;\n}", 2),
-            ("library (l) {\n a : b \\\n d;\n}", 3),
-            // The string of a path that ends in a backslash does not take in the next line.
-            ("library (l) {\n a : \"C:\\\";\n b : \"c\";\n}", 2),
-            ("library (l) {\n\n include_file (\"a.lib\");\n}", 3),
-            ("library (l) { /\n}", 2),
-            ("", 1),
-            // A vertical tab and another alphabet's blank are no blanks here, and end no word.
-            ("library (l) { a (\u{b}", 1),
-            ("library (l) { a (\u{2003}", 1),
-        ] {
-            assert_eq!(read(text).unwrap_err().line, line, "{text}");
-        }
-        let library = read("library (l) {\n area : wide; }").unwrap();
-        assert!(library.number("area").unwrap_err().message.contains("wide"));
-        let deep = |groups: usize| {
-            format!(
-                "library (l) {{ {}{} }}",
-                "g () { ".repeat(groups),
-                "}".repeat(groups)
-            )
-        };
-        assert!(read(&deep(DEEPEST)).is_ok());
-        for groups in [DEEPEST + 1, 10_000] {
-            assert!(read(&deep(groups)).unwrap_err().message.contains("deep"));
-        }
-    }
-}
+mod tests;

@@ -3,7 +3,7 @@
 //! Their cells are one library. Units may differ from file to file; what delays are measured at and between may not, because it would be
 //! another corner or another meaning of a slew.
 
-use super::error::{KitError, LibertyError};
+use super::error::{KitError, LibertyError, LibertyFault, place};
 use super::group::Group;
 use super::table::Templates;
 use super::units::Units;
@@ -25,10 +25,11 @@ impl<'g, 't> LibraryFile<'g, 't> {
     pub(super) fn new(name: &'g str, group: &'g Group<'t>) -> Result<Self, LibertyError> {
         let model = group.value("delay_model").unwrap_or("table_lookup");
         if model != "table_lookup" {
-            return Err(LibertyError {
-                line: group.line,
-                message: format!("its delay_model is {model}; give a library with table_lookup"),
-            });
+            let model = model.to_owned();
+            return Err(LibertyError::new(
+                group.line,
+                LibertyFault::DelayModel { model },
+            ));
         }
         Ok(LibraryFile {
             name,
@@ -40,11 +41,7 @@ impl<'g, 't> LibraryFile<'g, 't> {
 
     /// A line of it as messages have it.
     pub(super) fn place(&self, line: usize) -> String {
-        if self.name.is_empty() {
-            format!("line {line}")
-        } else {
-            format!("{}:{line}", self.name)
-        }
+        place(self.name, line)
     }
 }
 
@@ -71,27 +68,28 @@ const SHARED: [(&str, &str); 12] = [
 pub(super) fn check_files(files: &[LibraryFile<'_, '_>]) -> Result<(), KitError> {
     let mut cells = std::collections::HashMap::new();
     for (index, file) in files.iter().enumerate() {
-        let fault = |line: usize, message: String| KitError {
+        let kit_error = |line: usize, fault: LibertyFault| KitError {
             file: index,
-            fault: LibertyError { line, message },
+            error: LibertyError::new(line, fault),
         };
         let first = &files[0];
         let numbers = |name: &str| {
             let own = file.group.number(name);
-            let own = own.map_err(|fault| KitError { file: index, fault })?;
+            let own = own.map_err(|error| KitError { file: index, error })?;
             Ok([own, first.group.number(name).ok().flatten()])
         };
         for (name, unit) in SHARED {
             if let [Some(own), Some(of_first)] = numbers(name)?
                 && own != of_first
             {
-                return Err(fault(
-                    file.group.line,
-                    format!(
-                        "its {name} is {own} {unit}, and that of {} is {of_first}; give files of one corner",
-                        first.group.name()
-                    ),
-                ));
+                let fault = LibertyFault::OtherCorner {
+                    attribute: name,
+                    unit,
+                    own,
+                    first: first.group.name().to_owned(),
+                    of_first,
+                };
+                return Err(kit_error(file.group.line, fault));
             }
         }
         for cell in file.group.of_kind("cell") {
@@ -99,18 +97,16 @@ pub(super) fn check_files(files: &[LibraryFile<'_, '_>]) -> Result<(), KitError>
                 && before != index
             {
                 let other = &files[before];
-                return Err(fault(
-                    cell.line,
-                    format!(
-                        "the cell {} is in {} as well; leave one of both files out",
-                        cell.name(),
-                        if other.name.is_empty() {
-                            other.group.name()
-                        } else {
-                            other.name
-                        }
-                    ),
-                ));
+                let other = if other.name.is_empty() {
+                    other.group.name()
+                } else {
+                    other.name
+                };
+                let fault = LibertyFault::CellTwice {
+                    cell: cell.name().to_owned(),
+                    other: other.to_owned(),
+                };
+                return Err(kit_error(cell.line, fault));
             }
         }
     }

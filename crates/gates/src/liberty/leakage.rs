@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::error::LibertyError;
+use super::error::{LibertyError, LibertyFault};
 use super::group::Group;
 
 /// Leakage of a cell in the file's unit; none where neither the cell nor the library states one.
@@ -31,10 +31,8 @@ pub(super) fn leakage_of(
     // Of each supply: sum and number of what is stated for a condition, and for none.
     let mut supplies: BTreeMap<&str, [(f64, f64); 2]> = BTreeMap::new();
     for group in cell.of_kind("leakage_power") {
-        let value = group.number("value")?.ok_or_else(|| LibertyError {
-            line: group.line,
-            message: "this leakage_power has no value".to_owned(),
-        })?;
+        let missing = || LibertyError::new(group.line, LibertyFault::NoLeakageValue);
+        let value = group.number("value")?.ok_or_else(missing)?;
         let supply = group.value("related_pg_pin").unwrap_or_default();
         // What flows out is what flowed in.
         if is_ground(supply) {

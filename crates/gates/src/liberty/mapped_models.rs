@@ -11,7 +11,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
-use super::cell::{CellModel, FlipFlop, Role};
+use super::candidate::{FlipFlop, Role};
+use super::cell::CellModel;
 use super::characterised::CharacterisedNetlist;
 use super::function::TruthTable;
 use super::read::Liberty;

@@ -9,7 +9,7 @@
 //! A gate is any cell with its truth table, whatever its name. The one of least area gives the family, of which others are stronger drives
 //! (`family`). What a library lacks is put together from what it has: an AND from NAND and INV, a multiplexer or exclusive OR from four
 //! NANDs or NORs, a flip-flop of the other edge or of active-low controls with inverters (`flip_flops`). [`CellMap::notes`] says so.
-//! A cell that lacks something is passed over, and [`CellMap::odd`] says why.
+//! A cell that lacks something is passed over, and [`CellMap::remarks`] says why.
 
 mod family;
 mod flip_flops;
@@ -18,12 +18,13 @@ use crate::nearest;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use super::cell::{Candidate, CellModel, FlipFlop, Role};
-use super::complete::Remark;
-use super::error::{KitError, LibertyError};
+use super::candidate::{Candidate, FlipFlop, Role};
+use super::cell::CellModel;
+use super::error::{KitError, LibertyError, LibertyFault, PassedOver};
 use super::function::TruthTable;
 use super::kit::LibraryFile;
-use super::passed_over::PassedOver;
+use super::passed_over::cells_behind;
+use super::remark::{CellRemark, LibraryRemark, MadeOf};
 use crate::logic::Logic;
 use crate::netlist::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 
@@ -60,17 +61,17 @@ pub(super) struct Recipe {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellMap {
     pub(super) recipes: Vec<Recipe>,
-    /// What was put together, one sentence each.
-    pub notes: Vec<String>,
+    /// Kinds that several cells stand for together.
+    pub notes: Vec<MadeOf>,
     /// What is odd about the library and matters here: cells that were passed over, and what cells that are used leave out.
-    pub odd: Vec<String>,
+    pub remarks: Vec<LibraryRemark>,
 }
 
 /// The same while they are found.
 #[derive(Default)]
 struct Notes {
-    made: Vec<String>,
-    odd: Vec<String>,
+    made: Vec<MadeOf>,
+    remarks: Vec<LibraryRemark>,
 }
 
 impl CellMap {
@@ -98,8 +99,8 @@ pub(super) struct Maker<'g, 't> {
     slowest_slew_fs: f64,
     /// Tables that have been read, by the cell's group.
     models: RefCell<HashMap<*const (), Result<CellModel, LibertyError>>>,
-    /// Cells that are not used though they would fit, one sentence each.
-    passed_over: RefCell<Vec<String>>,
+    /// Cells that are not used though they would fit.
+    passed_over: RefCell<Vec<PassedOver>>,
 }
 
 impl<'g, 't> Maker<'g, 't> {
@@ -128,10 +129,9 @@ impl<'g, 't> Maker<'g, 't> {
     /// A kind that nothing can stand for, and wanted cells that are not there, do something else or lack something.
     pub(super) fn make(&self) -> Result<CellMap, KitError> {
         let library = self.files[0].group;
-        let fault = |message: String| {
-            let line = library.line;
-            let fault = LibertyError { line, message }.with_passed_over(self.unusable);
-            KitError { file: 0, fault }
+        let error = |fault: LibertyFault| KitError {
+            file: 0,
+            error: LibertyError::new(library.line, self.with_passed_over(fault)),
         };
         for (kind, name) in self.wanted {
             let found = self.candidates.iter().find(|c| c.name() == name);
@@ -142,18 +142,18 @@ impl<'g, 't> Maker<'g, 't> {
             });
             let Some(cell) = fits else {
                 let alike = nearest(name, self.candidates.iter().map(|c| c.name()));
-                let instead = alike.filter(|alike| *alike != name);
-                let instead =
-                    instead.map_or(String::new(), |alike| format!("; did you mean `{alike}`?"));
-                return Err(fault(format!(
-                    "the library {} has no cell {name} that does what {} does{instead}",
-                    library.name(),
-                    kind.name()
-                )));
+                let alike = alike.filter(|alike| *alike != name);
+                return Err(error(LibertyFault::NoSuchCell {
+                    library: library.name().to_owned(),
+                    cell: name.clone(),
+                    kind: *kind,
+                    alike: alike.map(str::to_owned),
+                    passed_over: Vec::new(),
+                }));
             };
             let file = cell.file;
             self.read_model(cell)
-                .map_err(|fault| KitError { file, fault })?;
+                .map_err(|error| KitError { file, error })?;
         }
         let (mut recipes, mut notes) = (Vec::new(), Notes::default());
         for kind in CellKind::ALL {
@@ -163,33 +163,39 @@ impl<'g, 't> Maker<'g, 't> {
                 self.gate(kind)
             };
             let recipe: Recipe = recipe.ok_or_else(|| {
-                let passed_over = self.passed_over.borrow();
-                let reasons = passed_over.iter().map(|reason| format!("; {reason}"));
-                fault(format!(
-                    "the library {} has nothing to make a {} from; {} would be enough (if the kit has more files, give all of them){}",
-                    library.name(),
-                    kind.name(),
-                    enough(kind),
-                    reasons.collect::<String>()
-                ))
+                error(LibertyFault::NothingToMake {
+                    library: library.name().to_owned(),
+                    kind,
+                    incomplete: self.passed_over.borrow().clone(),
+                    passed_over: Vec::new(),
+                })
             })?;
             if recipe.stages.len() > 1 {
                 let stages = recipe.stages.iter();
-                let cells: Vec<&str> = stages.map(|s| s.drives[0].name.as_str()).collect();
-                let cells = cells.join(" + ");
-                notes
-                    .made
-                    .push(format!("{} is made of {cells}", kind.name()));
+                let cells = stages.map(|stage| stage.drives[0].name.clone()).collect();
+                notes.made.push(MadeOf { kind, cells });
             }
             recipes.push(recipe);
         }
-        notes.odd.extend(self.passed_over.take());
-        notes.odd.extend(remarks(&recipes));
+        let not_used = self.passed_over.take().into_iter();
+        notes.remarks.extend(not_used.map(LibraryRemark::NotUsed));
+        notes.remarks.extend(remarks(&recipes));
         Ok(CellMap {
             recipes,
             notes: notes.made,
-            odd: notes.odd,
+            remarks: notes.remarks,
         })
+    }
+
+    /// A fault with the cells that it may be about.
+    fn with_passed_over(&self, mut fault: LibertyFault) -> LibertyFault {
+        let cells = cells_behind(&fault, self.unusable);
+        if let LibertyFault::NoSuchCell { passed_over, .. }
+        | LibertyFault::NothingToMake { passed_over, .. } = &mut fault
+        {
+            *passed_over = cells;
+        }
+        fault
     }
 
     fn gate(&self, kind: CellKind) -> Option<Recipe> {
@@ -268,23 +274,9 @@ impl<'g, 't> Maker<'g, 't> {
     }
 }
 
-/// What a library needs for a kind, beside an inverter.
-fn enough(kind: CellKind) -> &'static str {
-    use CellKind::*;
-    match kind {
-        Inv => "an inverter",
-        Buf => "a buffer or an inverter",
-        Nand2 | Nor2 | And2 | Or2 => "a NAND, NOR, AND or OR of two inputs",
-        Xor2 | Xnor2 => "an exclusive OR or NOR, a NAND or a NOR of two inputs",
-        Mux2 => "a 2:1 multiplexer (inverting or not), or a NAND or a NOR of two inputs",
-        Dffr => "a flip-flop with an asynchronous clear or preset (with a scan chain or not)",
-        Dffsr => "a flip-flop with an asynchronous clear and preset (with a scan chain or not)",
-    }
-}
-
-/// What the cells of recipes leave out, or have that is not used: a sentence for each, with the cells.
-fn remarks(recipes: &[Recipe]) -> Vec<String> {
-    let mut cells_by_remark: Vec<(&Remark, Vec<&str>)> = Vec::new();
+/// What the cells of recipes leave out, or have that is not used, each with the cells.
+fn remarks(recipes: &[Recipe]) -> Vec<LibraryRemark> {
+    let mut cells_by_remark: Vec<(&CellRemark, Vec<String>)> = Vec::new();
     let stages = recipes.iter().flat_map(|recipe| &recipe.stages);
     for model in stages.flat_map(|stage| &stage.drives) {
         for remark in &model.remarks {
@@ -296,18 +288,16 @@ fn remarks(recipes: &[Recipe]) -> Vec<String> {
                 cells_by_remark.len() - 1
             });
             let cells = &mut cells_by_remark[at].1;
-            if !cells.contains(&model.name.as_str()) {
-                cells.push(&model.name);
+            if !cells.contains(&model.name) {
+                cells.push(model.name.clone());
             }
         }
     }
-    let sentence = |(remark, cells): (&Remark, Vec<&str>)| match cells.as_slice() {
-        [first, _, _, others @ ..] if !others.is_empty() => {
-            remark.sentence(&format!("{first} and {} more cells", cells.len() - 1))
-        }
-        few => remark.sentence(&few.join(", ")),
+    let of_library = |(remark, cells): (&CellRemark, Vec<String>)| {
+        let remark = remark.clone();
+        LibraryRemark::Cells { remark, cells }
     };
-    cells_by_remark.into_iter().map(sentence).collect()
+    cells_by_remark.into_iter().map(of_library).collect()
 }
 
 /// Stages of which the last one drives the output; none where one is missing.

@@ -19,8 +19,12 @@
 //! | `function` | Boolean expressions as truth tables |
 //! | `table` | delays, slews and limits over slew and load |
 //! | `units` | what a file's numbers are in |
-//! | `cell` | which cells may be chosen, and their tables |
+//! | `candidate` | which cells may be chosen |
+//! | `cell`, `read_cell` | a chosen cell with its tables |
+//! | `words` | attributes that are one of a few words |
 //! | `passed_over` | the others, and why |
+//! | `error`, `syntax_fault`, `table_fault` | what can be wrong |
+//! | `remark` | what is odd, or was put together |
 //! | `flip_flop` | what a flip-flop's pins do, and which are tied |
 //! | `leakage` | what a cell leaks |
 //! | `complete` | what a cell must state, and what it leaves out |
@@ -35,6 +39,7 @@
 //! | `mapped_timing` | its delays and clocks for them |
 //! | `mapped_wires` | loads of its wires for them |
 
+mod candidate;
 mod cell;
 mod characterised;
 mod complete;
@@ -52,21 +57,28 @@ mod mapped_wires;
 mod mapping;
 mod passed_over;
 mod read;
+mod read_cell;
+mod remark;
+mod syntax_fault;
 mod table;
+mod table_fault;
 mod text;
 mod units;
 mod verilog_name;
+mod words;
 
 #[cfg(feature = "yosys")]
-pub(crate) use cell::{CellFunction, Role};
+pub(crate) use candidate::{CellFunction, Role};
 pub use characterised::{CharacterisedNetlist, Environment};
-pub use error::{KitError, LibertyError};
+pub use error::{KitError, LibertyError, LibertyFault, PassedOver, PassedOverReason};
 #[cfg(feature = "yosys")]
 pub(crate) use function::TruthTable;
 pub use mapped_models::write_mapped_cells;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};
 pub use mapped_verilog::write_mapped;
 pub use mapping::CellMap;
-pub use passed_over::PassedOver;
 pub use read::Liberty;
+pub use remark::{CellRemark, LibraryRemark, MadeOf};
+pub use syntax_fault::LibertySyntaxFault;
+pub use table_fault::{LibertyTableFault, LibertyUnit};
 pub use text::liberty_text;

@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 
-use super::cell::{Candidate, CellFunction, Role};
-use super::error::{KitError, LibertyError};
+use super::candidate::{Candidate, CellFunction, Role};
+use super::error::{KitError, LibertyError, PassedOver};
 use super::group;
 use super::kit::{self, LibraryFile};
 use super::mapping::{CellMap, Maker};
-use super::passed_over::PassedOver;
+use super::remark::LibraryRemark;
 use super::text::joined;
 use super::units::Units;
 use crate::netlist::CellKind;
@@ -47,7 +47,7 @@ impl Liberty {
     /// # Example
     ///
     /// ```
-    /// use femtogate::liberty::Liberty;
+    /// use femtogate::liberty::{Liberty, LibertyFault, LibertyTableFault, LibertyUnit};
     /// use femtogate::netlist::CellKind;
     ///
     /// let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/three_cells.lib");
@@ -56,7 +56,11 @@ impl Liberty {
     /// assert_eq!(library.name, "three_cells");
     /// assert_eq!(library.map.cells(CellKind::And2), ["NAND", "INV"]);
     ///
-    /// let fault = Liberty::read(&text.replace("1ns", "1h"), &[]).unwrap_err();
+    /// let error = Liberty::read(&text.replace("1ns", "1h"), &[]).unwrap_err();
+    /// let unit = LibertyUnit::Time;
+    /// let text = "1h".to_owned();
+    /// let fault = LibertyTableFault::UnknownUnit { unit, text };
+    /// assert_eq!((error.line, error.fault), (1, LibertyFault::Table(fault.clone())));
     /// assert_eq!(
     ///     fault.to_string(),
     ///     "its time_unit is \"1h\"; give a number, a prefix and s, as in 1ns"
@@ -64,7 +68,7 @@ impl Liberty {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn read(text: &str, wanted: &[(CellKind, String)]) -> Result<Self, LibertyError> {
-        Self::read_files(&[("", text)], wanted).map_err(|e| e.fault)
+        Self::read_files(&[("", text)], wanted).map_err(|e| e.error)
     }
 
     /// Reads a library of several files, each with the name that messages call it.
@@ -75,7 +79,7 @@ impl Liberty {
         files: &[(&str, &str)],
         wanted: &[(CellKind, String)],
     ) -> Result<Self, KitError> {
-        let in_file = |file: usize| move |fault: LibertyError| KitError { file, fault };
+        let in_file = |file: usize| move |error: LibertyError| KitError { file, error };
         let texts: Vec<_> = files.iter().map(|(_, text)| joined(text)).collect();
         let mut groups = Vec::new();
         for (index, text) in texts.iter().enumerate() {
@@ -121,9 +125,7 @@ impl Liberty {
         ];
         let mut map = Maker::new(&read, &candidates, &passed_over, wanted).make()?;
         if conditions[0].is_none() {
-            let told =
-                "no supply (nom_voltage) is stated; energies of loads are those at an assumed one";
-            map.odd.push(told.to_owned());
+            map.remarks.push(LibraryRemark::NoSupply);
         }
         // A cell with tied pins does what it says only where they are tied.
         let is_plain = |role: &Role| !matches!(role, Role::FlipFlop(roles) if roles.tied != 0);

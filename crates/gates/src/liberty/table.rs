@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use super::error::LibertyError;
 use super::group::Group;
+use super::table_fault::LibertyTableFault as Fault;
 use super::units::Units;
 
 /// What an axis is of.
@@ -41,15 +42,15 @@ impl Table {
     ///
     /// # Errors
     /// The first one beyond 4.295 us.
-    pub(super) fn check_range(&self, line: usize, what: &str) -> Result<(), LibertyError> {
+    pub(super) fn check_range(&self, line: usize, attribute: &str) -> Result<(), LibertyError> {
         let mut values = self.values.iter();
         let beyond = values.find(|&&fs| fs > f64::from(u32::MAX));
         beyond.map_or(Ok(()), |fs| {
-            let us = fs * 1e-9;
-            Err(LibertyError {
-                line,
-                message: format!("its {what} reaches {us:.3} us; times up to 4.295 us are known"),
-            })
+            let fault = Fault::TimeOutOfRange {
+                attribute: attribute.to_owned(),
+                time_fs: *fs,
+            };
+            Err(LibertyError::new(line, fault))
         })
     }
 
@@ -114,25 +115,22 @@ impl<'g, 't> Templates<'g, 't> {
         units: Units,
         unit: f64,
     ) -> Result<Table, LibertyError> {
-        let fault = |message: String| LibertyError {
-            line: group.line,
-            message,
-        };
+        let fault = |fault: Fault| LibertyError::new(group.line, fault);
+        let table = || group.kind.to_owned();
         let numbers = group.numbers("values")?;
-        let mut values = numbers.ok_or_else(|| fault(format!("{} has no values", group.kind)))?;
+        let mut values = numbers.ok_or_else(|| fault(Fault::NoValues { table: table() }))?;
         let template = self.0.get(group.name());
         if let Some(third) = template.and_then(|template| template.value("variable_3")) {
-            return Err(fault(format!(
-                "the table {} is over three axes, of which the third is {third}; tables over slews and loads are read",
-                group.name()
-            )));
+            return Err(fault(Fault::ThreeAxes {
+                template: group.name().to_owned(),
+                axis: third.to_owned(),
+            }));
         }
         if template.is_none() && values.len() > 1 {
-            return Err(fault(format!(
-                "{} has the axes of {:?}, a template that the library does not have",
-                group.kind,
-                group.name()
-            )));
+            return Err(fault(Fault::UnknownTemplate {
+                table: table(),
+                template: group.name().to_owned(),
+            }));
         }
         let mut axes: [(Option<Axis>, Vec<f64>); 2] = Default::default();
         for (index, axis) in axes.iter_mut().enumerate() {
@@ -145,36 +143,37 @@ impl<'g, 't> Templates<'g, 't> {
                 "constrained_pin_transition" => (Axis::Other, units.time_fs),
                 "total_output_net_capacitance" => (Axis::Other, units.load_ff),
                 _ => {
-                    return Err(fault(format!(
-                        "the table {} is over {variable}; tables over slews and loads are read",
-                        group.name()
-                    )));
+                    return Err(fault(Fault::UnknownAxis {
+                        template: group.name().to_owned(),
+                        axis: variable.to_owned(),
+                    }));
                 }
             };
-            let name = ["index_1", "index_2"][index];
-            let marks = match group.numbers(name)? {
+            let index = ["index_1", "index_2"][index];
+            let marks = match group.numbers(index)? {
                 Some(marks) => marks,
                 None => template
-                    .map(|t| t.numbers(name))
+                    .map(|t| t.numbers(index))
                     .transpose()?
                     .flatten()
                     .unwrap_or_default(),
             };
             if marks.is_empty() || marks.windows(2).any(|pair| pair[0] >= pair[1]) {
-                return Err(fault(format!("{name} of {} does not rise", group.kind)));
+                let table = table();
+                return Err(fault(Fault::NotRising { index, table }));
             }
             *axis = (
                 Some(of),
                 marks.into_iter().map(|mark| mark * unit).collect(),
             );
         }
-        let wants: usize = axes.iter().map(|(_, marks)| marks.len().max(1)).product();
-        if values.len() != wants || axes[0].0.is_some() && axes[0].0 == axes[1].0 {
-            return Err(fault(format!(
-                "{} has {} values, and its axes want {wants}",
-                group.kind,
-                values.len()
-            )));
+        let wanted: usize = axes.iter().map(|(_, marks)| marks.len().max(1)).product();
+        if values.len() != wanted || axes[0].0.is_some() && axes[0].0 == axes[1].0 {
+            return Err(fault(Fault::ValueCount {
+                table: table(),
+                values: values.len(),
+                wanted,
+            }));
         }
         values.iter_mut().for_each(|value| *value *= unit);
         let [first, second] = axes;
@@ -257,7 +256,7 @@ mod tests {
                 "reaches 5.000 us",
             ),
         ] {
-            let message = table(text).unwrap_err().message;
+            let message = table(text).unwrap_err().to_string();
             assert!(message.contains(says), "{message}");
         }
     }

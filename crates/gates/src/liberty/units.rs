@@ -5,6 +5,7 @@
 
 use super::error::LibertyError;
 use super::group::Group;
+use super::table_fault::{LibertyTableFault, LibertyUnit};
 
 /// What a file's numbers are in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,32 +23,27 @@ impl Units {
     /// # Errors
     /// A unit that is none, and a library without a unit of capacitance.
     pub(super) fn read(library: &Group<'_>) -> Result<Self, LibertyError> {
-        let fault = |message: String| LibertyError {
-            line: library.line,
-            message,
-        };
-        let unit = |attribute: &str, (letter, power): (char, i32), example: &str, default: f64| {
-            let Some(text) = library.value(attribute) else {
+        let fault = |fault| LibertyError::new(library.line, fault);
+        let amount_of = |unit: LibertyUnit, power: i32, default: f64| {
+            let Some(text) = library.value(unit.attribute()) else {
                 return Ok(default);
             };
-            amount(text, letter, power).ok_or_else(|| {
-                fault(format!(
-                    "its {attribute} is {text:?}; give a number, a prefix and {letter}, as in {example}"
-                ))
+            amount(text, unit.letter(), power).ok_or_else(|| {
+                let text = text.to_owned();
+                fault(LibertyTableFault::UnknownUnit { unit, text })
             })
         };
         let load_ff = match library.values("capacitive_load_unit") {
             Some([number, unit]) => amount(&format!("{number}{unit}"), 'f', 15),
             _ => None,
         };
-        let load_ff = load_ff
-            .ok_or_else(|| fault("it has no capacitive_load_unit of ff or pf".to_owned()))?;
-        let volt = unit("voltage_unit", ('V', 0), "1V", 1.0)?;
+        let load_ff = load_ff.ok_or_else(|| fault(LibertyTableFault::NoLoadUnit))?;
+        let volt = amount_of(LibertyUnit::Voltage, 0, 1.0)?;
         Ok(Units {
-            time_fs: unit("time_unit", ('s', 15), "1ns", 1e6)?,
+            time_fs: amount_of(LibertyUnit::Time, 15, 1e6)?,
             load_ff,
             energy_fj: load_ff * volt * volt,
-            leakage_w: unit("leakage_power_unit", ('W', 0), "1nW", 1e-9)?,
+            leakage_w: amount_of(LibertyUnit::LeakagePower, 0, 1e-9)?,
         })
     }
 

@@ -16,6 +16,7 @@ use super::delay::DelayModel;
 use super::flat::Netlist;
 use super::id::CellId;
 use super::own_delay::OwnDelay;
+use crate::units::Time;
 
 /// Longest stage in the typical corner, fs: shorter than the shortest pulse that gates of this library leave, 57.6 ps.
 const LONGEST_STAGE_FS: f64 = 50_000.0;
@@ -26,8 +27,8 @@ const SLOWEST_SIGMAS: f64 = 5.0;
 /// A kind of chain: what its cells are on average.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Chain {
-    /// Delay of all stages in the typical corner, fs.
-    pub typical_fs: u32,
+    /// Delay of all stages in the typical corner.
+    pub typical: Time,
     /// Number of stages.
     pub stages: usize,
 }
@@ -38,9 +39,9 @@ impl Chain {
         let own = own.filter(|own| own.model == DelayModel::Transport)?;
         debug_assert_eq!(kind, CellKind::Buf, "only wires have transport delays");
         let sigma = own.spread.map_or(0.0, |spread| spread.sigma);
-        let slowest_fs = f64::from(own.typical_fs) * (1.0 + SLOWEST_SIGMAS * sigma);
+        let slowest_fs = own.typical.as_fs() as f64 * (1.0 + SLOWEST_SIGMAS * sigma);
         Some(Chain {
-            typical_fs: own.typical_fs,
+            typical: own.typical,
             stages: (slowest_fs / LONGEST_STAGE_FS).ceil().max(1.0) as usize,
         })
     }
@@ -63,12 +64,12 @@ impl Chain {
 
     /// Name of its module in Verilog.
     pub(crate) fn module(self) -> String {
-        format!("DELAY_{}_{}", self.typical_fs, self.stages)
+        format!("DELAY_{}_{}", self.typical.as_fs(), self.stages)
     }
 
     /// Name of its stages' module in Verilog and SDF.
     pub(crate) fn stage_module(self) -> String {
-        format!("STAGE_{}_{}", self.typical_fs, self.stages)
+        format!("STAGE_{}_{}", self.typical.as_fs(), self.stages)
     }
 
     /// Name of one of its stages.
@@ -101,8 +102,9 @@ mod tests {
     /// Chains of other delays or stages are other modules.
     #[test]
     fn modules_are_named_after_delay_and_stages() {
-        let chain = |typical_fs| {
-            Chain::from_delay(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap()
+        let chain = |fs| {
+            let wire = OwnDelay::wire(Time::from_fs(fs));
+            Chain::from_delay(CellKind::Buf, Some(wire)).unwrap()
         };
         let (short, long) = (chain(50_000), chain(120_000));
         assert_eq!(
@@ -119,7 +121,8 @@ mod tests {
     proptest! {
         #[test]
         fn stages_are_alike_and_add_up(fs: u32, typical_fs in 1u32..10_000_000) {
-            let chain = Chain::from_delay(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap();
+            let wire = OwnDelay::wire(Time::from_fs(typical_fs.into()));
+            let chain = Chain::from_delay(CellKind::Buf, Some(wire)).unwrap();
             let parts: Vec<u32> = chain.parts(fs).collect();
             prop_assert_eq!(parts.len(), chain.stages);
             prop_assert_eq!(parts.iter().map(|&fs| u64::from(fs)).sum::<u64>(), u64::from(fs));

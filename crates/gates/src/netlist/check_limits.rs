@@ -15,6 +15,7 @@
 
 use super::cell::CellKind;
 use super::corner::{Corner, Delay, Edge};
+use crate::units::Time;
 
 /// A limit on D, by the direction in which it changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -26,11 +27,11 @@ pub struct DataLimit {
 }
 
 impl DataLimit {
-    /// Corners scaled from the typical limits, fs.
-    pub const fn scaled(rise_fs: u32, fall_fs: u32) -> Self {
+    /// Corners scaled from the typical limits.
+    pub const fn scaled(rise: Time, fall: Time) -> Self {
         DataLimit {
-            rise: Delay::scaled(rise_fs),
-            fall: Delay::scaled(fall_fs),
+            rise: Delay::scaled(rise),
+            fall: Delay::scaled(fall),
         }
     }
 
@@ -133,27 +134,33 @@ impl CheckKind {
 impl CheckLimits {
     /// The library's limits of one cell (all zero for gates).
     pub const fn for_cell(kind: CellKind) -> Self {
+        const fn limit(fs: i64) -> Delay {
+            Delay::scaled(Time::from_fs(fs))
+        }
+        const fn data(rise_fs: i64, fall_fs: i64) -> DataLimit {
+            DataLimit::scaled(Time::from_fs(rise_fs), Time::from_fs(fall_fs))
+        }
         match kind {
             CellKind::Dffr => CheckLimits {
-                setup: DataLimit::scaled(31_019, 35_023),
-                hold: DataLimit::scaled(12_037, 10_009),
-                recovery: Delay::scaled(40_009),
-                removal: Delay::scaled(25_031),
-                clock_high: Delay::scaled(60_013),
-                clock_low: Delay::scaled(62_017),
-                control_high: Delay::scaled(61_027),
+                setup: data(31_019, 35_023),
+                hold: data(12_037, 10_009),
+                recovery: limit(40_009),
+                removal: limit(25_031),
+                clock_high: limit(60_013),
+                clock_low: limit(62_017),
+                control_high: limit(61_027),
             },
             CellKind::Dffsr => CheckLimits {
-                setup: DataLimit::scaled(39_023, 44_017),
-                hold: DataLimit::scaled(15_013, 12_511),
-                recovery: Delay::scaled(51_031),
-                removal: Delay::scaled(32_009),
-                clock_high: Delay::scaled(77_017),
-                clock_low: Delay::scaled(79_031),
-                control_high: Delay::scaled(78_007),
+                setup: data(39_023, 44_017),
+                hold: data(15_013, 12_511),
+                recovery: limit(51_031),
+                removal: limit(32_009),
+                clock_high: limit(77_017),
+                clock_low: limit(79_031),
+                control_high: limit(78_007),
             },
             _ => {
-                const NONE: Delay = Delay::fixed(0);
+                const NONE: Delay = Delay::fixed(Time::ZERO);
                 CheckLimits {
                     setup: DataLimit::both(NONE),
                     hold: DataLimit::both(NONE),
@@ -185,9 +192,9 @@ impl CheckLimits {
         }
     }
 
-    /// The limit of one check in one corner, fs; that of setup and hold for D changing in the direction of `edge`,
+    /// The limit of one check in one corner; that of setup and hold for D changing in the direction of `edge`,
     /// which the other checks ignore.
-    pub const fn edge_limit_fs(&self, check: CheckKind, edge: Edge, corner: Corner) -> u32 {
+    pub const fn edge_limit(&self, check: CheckKind, edge: Edge, corner: Corner) -> Time {
         let limit = match check {
             CheckKind::Setup => self.setup.for_edge(edge),
             CheckKind::Hold => self.hold.for_edge(edge),
@@ -197,14 +204,13 @@ impl CheckLimits {
             CheckKind::ClockLow => self.clock_low,
             CheckKind::ControlHigh => self.control_high,
         };
-        limit.in_corner_fs(corner)
+        limit.in_corner(corner)
     }
 
-    /// The limit of one check in one corner, fs; the larger one where D's directions differ.
-    pub const fn limit_fs(&self, check: CheckKind, corner: Corner) -> u32 {
-        let rise = self.edge_limit_fs(check, Edge::Rise, corner);
-        let fall = self.edge_limit_fs(check, Edge::Fall, corner);
-        if rise > fall { rise } else { fall }
+    /// The limit of one check in one corner; the larger one where D's directions differ.
+    pub fn limit(&self, check: CheckKind, corner: Corner) -> Time {
+        let limits = Edge::BOTH.map(|edge| self.edge_limit(check, edge, corner));
+        limits[0].max(limits[1])
     }
 }
 
@@ -219,9 +225,9 @@ mod tests {
         for kind in CellKind::ALL {
             for check in CheckKind::ALL {
                 let [min, typ, max] =
-                    Corner::ALL.map(|c| CheckLimits::for_cell(kind).limit_fs(check, c));
+                    Corner::ALL.map(|c| CheckLimits::for_cell(kind).limit(check, c));
                 assert!(min <= typ && typ <= max);
-                assert_eq!(typ != 0, kind.is_flip_flop());
+                assert_eq!(typ != Time::ZERO, kind.is_flip_flop());
             }
         }
     }
@@ -232,9 +238,9 @@ mod tests {
             for check in CheckKind::ALL {
                 for corner in Corner::ALL {
                     let limits = CheckLimits::for_cell(kind);
-                    let either = [Edge::Rise, Edge::Fall]
-                        .map(|edge| limits.edge_limit_fs(check, edge, corner));
-                    assert_eq!(Some(&limits.limit_fs(check, corner)), either.iter().max());
+                    let either =
+                        [Edge::Rise, Edge::Fall].map(|edge| limits.edge_limit(check, edge, corner));
+                    assert_eq!(Some(&limits.limit(check, corner)), either.iter().max());
                 }
             }
         }
@@ -246,9 +252,9 @@ mod tests {
         let library = Library::generic_40nm();
         for kind in CellKind::ALL.into_iter().filter(|k| k.is_flip_flop()) {
             for corner in Corner::ALL {
-                let clock_to_q = library.delay(kind, 1, Logic::One, corner).as_fs();
-                let hold = library.checks(kind).limit_fs(CheckKind::Hold, corner);
-                assert!(i64::from(hold) < clock_to_q);
+                let clock_to_q = library.delay(kind, 1, Logic::One, corner);
+                let hold = library.checks(kind).limit(CheckKind::Hold, corner);
+                assert!(hold < clock_to_q);
             }
         }
     }

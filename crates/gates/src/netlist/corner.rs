@@ -1,6 +1,7 @@
 //! What delays and limits are given for: three corners of silicon, two directions of a change.
 
 use crate::logic::Logic;
+use crate::units::Time;
 
 /// Which of the three characterised delays applies: of slow, typical or fast silicon. SDF calls the delays max, typ and
 /// min, and configurations may, too.
@@ -50,49 +51,69 @@ impl std::str::FromStr for Corner {
 /// Minimum, typical and maximum of one delay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Delay {
-    /// Fast corner, fs.
-    pub min_fs: u32,
-    /// Typical corner, fs.
-    pub typ_fs: u32,
-    /// Slow corner, fs.
-    pub max_fs: u32,
+    /// Fast corner.
+    pub min: Time,
+    /// Typical corner.
+    pub typ: Time,
+    /// Slow corner.
+    pub max: Time,
 }
 
 impl Delay {
+    /// Longest delay or limit that is kept: 4.29 µs, which is 32 bits of femtoseconds.
+    pub const LONGEST: Time = Time::from_fs(u32::MAX as i64);
+
     /// The same delay in every corner.
-    pub const fn fixed(fs: u32) -> Self {
+    pub const fn fixed(delay: Time) -> Self {
         Delay {
-            min_fs: fs,
-            typ_fs: fs,
-            max_fs: fs,
+            min: delay,
+            typ: delay,
+            max: delay,
         }
     }
 
     /// Fast and slow corners scaled from the typical delay.
-    pub const fn scaled(typ_fs: u32) -> Self {
+    pub const fn scaled(typ: Time) -> Self {
         Delay {
-            min_fs: (typ_fs as u64 * 72 / 100) as u32,
-            typ_fs,
-            max_fs: (typ_fs as u64 * 145 / 100) as u32,
+            min: Time::from_fs(typ.as_fs() * 72 / 100),
+            typ,
+            max: Time::from_fs(typ.as_fs() * 145 / 100),
         }
     }
 
     /// Every corner times `factor`, rounded to whole femtoseconds.
     pub(crate) fn times(self, factor: f64) -> Self {
-        let scale = |fs: u32| (fs as f64 * factor).round() as u32;
+        let scale = |time: Time| Time::from_fs((time.as_fs() as f64 * factor).round() as i64);
         Delay {
-            min_fs: scale(self.min_fs),
-            typ_fs: scale(self.typ_fs),
-            max_fs: scale(self.max_fs),
+            min: scale(self.min),
+            typ: scale(self.typ),
+            max: scale(self.max),
         }
     }
 
-    /// The delay of one corner, fs.
-    pub const fn in_corner_fs(self, corner: Corner) -> u32 {
+    /// The delay of one corner.
+    pub const fn in_corner(self, corner: Corner) -> Time {
         match corner {
-            Corner::Fast => self.min_fs,
-            Corner::Typ => self.typ_fs,
-            Corner::Slow => self.max_fs,
+            Corner::Fast => self.min,
+            Corner::Typ => self.typ,
+            Corner::Slow => self.max,
+        }
+    }
+
+    /// The delay of one corner as it is kept, fs.
+    pub(crate) const fn in_corner_fs(self, corner: Corner) -> u32 {
+        Self::kept_fs(self.in_corner(corner))
+    }
+
+    /// A time as delays and limits are kept, fs: negative ones are 0, and longer ones are the longest.
+    pub(crate) const fn kept_fs(time: Time) -> u32 {
+        let fs = time.as_fs();
+        if fs < 0 {
+            0
+        } else if fs > u32::MAX as i64 {
+            u32::MAX
+        } else {
+            fs as u32
         }
     }
 }
@@ -144,16 +165,25 @@ mod tests {
     #[test]
     fn every_corner_is_scaled_and_rounded() {
         let delay = Delay {
-            min_fs: 3,
-            typ_fs: 100,
-            max_fs: 1001,
+            min: Time::from_fs(3),
+            typ: Time::from_fs(100),
+            max: Time::from_fs(1001),
         };
         let scaled = delay.times(1.5);
         assert_eq!(
             Corner::ALL.map(|corner| scaled.in_corner_fs(corner)),
             [5, 150, 1502]
         );
-        let [min, typ, max] = Corner::ALL.map(|corner| Delay::scaled(1000).in_corner_fs(corner));
+        let scaled = |fs| Delay::scaled(Time::from_fs(fs));
+        let [min, typ, max] = Corner::ALL.map(|corner| scaled(1000).in_corner_fs(corner));
         assert_eq!([min, typ, max], [720, 1000, 1450]);
+    }
+
+    #[test]
+    fn what_cannot_be_kept_is_the_nearest_that_can() {
+        let kept = |fs| Delay::kept_fs(Time::from_fs(fs));
+        let longest = i64::from(u32::MAX);
+        let found = [i64::MIN, -1, 0, 7, longest, longest + 1, i64::MAX].map(kept);
+        assert_eq!(found, [0, 0, 0, 7, u32::MAX, u32::MAX, u32::MAX]);
     }
 }

@@ -1,7 +1,9 @@
 //! What a delay is: from which input to which output, to which edge, and what it does to short pulses.
 
 use super::cell::{MAX_INPUTS, MAX_OUTPUTS};
+use super::corner::Delay;
 use crate::logic::Logic;
+use crate::units::Time;
 
 /// What becomes of a pulse that is shorter than the delay it meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -14,19 +16,42 @@ pub enum DelayModel {
     Transport,
 }
 
-/// Delays from one input pin to one output pin, fs.
+/// Delays from one input pin to one output pin. They are kept in 32 bits, as a chip has many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ArcDelay {
     /// To a rising output.
-    pub rise_fs: u32,
+    pub(crate) rise_fs: u32,
     /// To a falling output.
-    pub fall_fs: u32,
+    pub(crate) fall_fs: u32,
 }
 
 impl ArcDelay {
-    /// Delay of an output change to `to`, fs; a change to X takes the shorter one.
+    /// Delays to a rising and to a falling output: from 0 to [`Delay::LONGEST`], of which the nearer one counts for others.
+    pub const fn new(rise: Time, fall: Time) -> Self {
+        ArcDelay {
+            rise_fs: Delay::kept_fs(rise),
+            fall_fs: Delay::kept_fs(fall),
+        }
+    }
+
+    /// Delay to a rising output.
+    pub const fn rise(self) -> Time {
+        Time::from_fs(self.rise_fs as i64)
+    }
+
+    /// Delay to a falling output.
+    pub const fn fall(self) -> Time {
+        Time::from_fs(self.fall_fs as i64)
+    }
+
+    /// Delay of an output change to `to`; a change to X takes the shorter one.
     #[inline]
-    pub fn delay_fs(self, to: Logic) -> u32 {
+    pub fn delay(self, to: Logic) -> Time {
+        Time::from_fs(self.delay_fs(to).into())
+    }
+
+    #[inline]
+    pub(crate) fn delay_fs(self, to: Logic) -> u32 {
         match to {
             Logic::One => self.rise_fs,
             Logic::Zero => self.fall_fs,

@@ -3,9 +3,8 @@
 #[cfg(feature = "liberty")]
 use super::check_limits::DataLimit;
 use super::check_limits::{CheckKind, CheckLimits};
-#[cfg(feature = "liberty")]
-use super::corner::Delay;
-use super::corner::{Corner, Edge};
+use super::corner::{Corner, Delay, Edge};
+use crate::units::Time;
 
 /// Which of a flip-flop's controls a check is about. D and CK have no such choice and are under `Reset`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +43,7 @@ impl InstanceLimits {
     pub(crate) fn of_kind(&self) -> CheckLimits {
         let larger_limit = |check, edge| {
             let controls = [Control::Reset, Control::Set];
-            let limits = controls.map(|control| self.limit_fs(control, check, edge));
+            let limits = controls.map(|control| self.limit(control, check, edge));
             Delay::fixed(limits[0].max(limits[1]))
         };
         let data = |check| DataLimit {
@@ -65,13 +64,18 @@ impl InstanceLimits {
 
     /// What the library says in one corner.
     pub(crate) fn from_library(limits: &CheckLimits, corner: Corner) -> Self {
-        let by_edge = |check| Edge::BOTH.map(|edge| limits.edge_limit_fs(check, edge, corner));
+        let limit_fs = |check, edge| Delay::kept_fs(limits.edge_limit(check, edge, corner));
+        let by_edge = |check| Edge::BOTH.map(|edge| limit_fs(check, edge));
         InstanceLimits([CheckKind::ALL.map(by_edge); 2])
     }
 
-    /// One limit, fs.
+    /// One limit.
+    pub const fn limit(&self, control: Control, check: CheckKind, edge: Edge) -> Time {
+        Time::from_fs(self.limit_fs(control, check, edge) as i64)
+    }
+
     #[inline]
-    pub const fn limit_fs(&self, control: Control, check: CheckKind, edge: Edge) -> u32 {
+    pub(crate) const fn limit_fs(&self, control: Control, check: CheckKind, edge: Edge) -> u32 {
         self.0[control as usize][check as usize][edge as usize]
     }
 

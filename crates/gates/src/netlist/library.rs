@@ -27,11 +27,11 @@ pub struct TimingArc {
 }
 
 impl TimingArc {
-    /// Both directions, corners scaled from the typical delays (fs).
-    pub const fn scaled(rise_fs: u32, fall_fs: u32) -> Self {
+    /// Both directions, corners scaled from the typical delays.
+    pub const fn scaled(rise: Time, fall: Time) -> Self {
         TimingArc {
-            rise: Delay::scaled(rise_fs),
-            fall: Delay::scaled(fall_fs),
+            rise: Delay::scaled(rise),
+            fall: Delay::scaled(fall),
         }
     }
 
@@ -39,18 +39,15 @@ impl TimingArc {
     #[cfg(feature = "liberty")]
     pub(crate) const fn fixed(delay: ArcDelay) -> Self {
         TimingArc {
-            rise: Delay::fixed(delay.rise_fs),
-            fall: Delay::fixed(delay.fall_fs),
+            rise: Delay::fixed(delay.rise()),
+            fall: Delay::fixed(delay.fall()),
         }
     }
 
-    /// Delay of an output change to `to` in one corner, fs. A change to X takes the shorter of the
+    /// Delay of an output change to `to` in one corner. A change to X takes the shorter of the
     /// two, as in IEEE 1364 for gates without a third delay.
-    pub fn delay_fs(self, corner: Corner, to: Logic) -> u32 {
-        let (rise, fall) = (
-            self.rise.in_corner_fs(corner),
-            self.fall.in_corner_fs(corner),
-        );
+    pub fn delay(self, corner: Corner, to: Logic) -> Time {
+        let (rise, fall) = (self.rise.in_corner(corner), self.fall.in_corner(corner));
         match to {
             Logic::One => rise,
             Logic::Zero => fall,
@@ -76,11 +73,11 @@ impl Library {
     /// Delays of a real library come from its Liberty file: [`Liberty::timing`](crate::liberty::Liberty::timing).
     pub fn generic_40nm() -> Self {
         /// To every output alike.
-        const fn arcs(rise_fs: u32, fall_fs: u32) -> [TimingArc; MAX_OUTPUTS] {
-            [TimingArc::scaled(rise_fs, fall_fs); MAX_OUTPUTS]
+        const fn arcs(rise_fs: i64, fall_fs: i64) -> [TimingArc; MAX_OUTPUTS] {
+            [TimingArc::scaled(Time::from_fs(rise_fs), Time::from_fs(fall_fs)); MAX_OUTPUTS]
         }
         const NONE: [TimingArc; MAX_OUTPUTS] = arcs(0, 0);
-        const fn gate(rise_fs: u32, fall_fs: u32) -> CellArcs {
+        const fn gate(rise_fs: i64, fall_fs: i64) -> CellArcs {
             [arcs(rise_fs, fall_fs), arcs(rise_fs, fall_fs), NONE, NONE]
         }
         const CLOCK_TO_Q: [TimingArc; MAX_OUTPUTS] = arcs(75_311, 75_311);
@@ -115,10 +112,8 @@ impl Library {
 
     /// Delays of one cell in a corner.
     pub(crate) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
-        let arc = |arc: TimingArc| ArcDelay {
-            rise_fs: arc.rise.in_corner_fs(corner),
-            fall_fs: arc.fall.in_corner_fs(corner),
-        };
+        let arc =
+            |arc: TimingArc| ArcDelay::new(arc.rise.in_corner(corner), arc.fall.in_corner(corner));
         self.arcs(kind).map(|outputs| outputs.map(arc))
     }
 
@@ -152,7 +147,7 @@ impl Library {
     /// assert_eq!(typ.to_string(), "18.979 ps");
     /// ```
     pub fn delay(&self, kind: CellKind, pin: usize, to: Logic, corner: Corner) -> Time {
-        Time::from_fs(self.arcs(kind)[pin][0].delay_fs(corner, to) as i64)
+        self.arcs(kind)[pin][0].delay(corner, to)
     }
 }
 
@@ -174,7 +169,8 @@ mod tests {
 
     #[test]
     fn unknown_outputs_come_as_early_as_any() {
-        let arc = TimingArc::scaled(20, 10);
-        assert_eq!(arc.delay_fs(Corner::Typ, Logic::X), 10);
+        let [longer, shorter] = [20, 10].map(Time::from_fs);
+        let arc = TimingArc::scaled(longer, shorter);
+        assert_eq!(arc.delay(Corner::Typ, Logic::X), shorter);
     }
 }

@@ -8,12 +8,13 @@ use super::cell::{MAX_INPUTS, MAX_OUTPUTS};
 use super::corner::{Corner, Delay};
 use super::delay::{ArcDelay, CellDelays, DelayModel};
 use super::mismatch::Mismatch;
+use crate::units::Time;
 
 /// The delay of one cell, the same from every input and in either direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OwnDelay {
-    /// Delay in the typical corner, on average over cells like this, fs.
-    pub typical_fs: u32,
+    /// Delay in the typical corner, on average over cells like this.
+    pub typical: Time,
     /// How cells like this differ from each other: the standard deviation is relative to the mean.
     pub spread: Option<Mismatch>,
     /// What becomes of short pulses.
@@ -24,9 +25,9 @@ pub struct OwnDelay {
 
 impl OwnDelay {
     /// A gate that is as fast either way, and otherwise as gates are.
-    pub const fn balanced(typical_fs: u32) -> Self {
+    pub const fn balanced(typical: Time) -> Self {
         OwnDelay {
-            typical_fs,
+            typical,
             spread: None,
             model: DelayModel::Inertial,
             mismatches: true,
@@ -34,9 +35,9 @@ impl OwnDelay {
     }
 
     /// A wire with repeaters: as fast or slow as the silicon, and too many of them to differ from another such wire.
-    pub const fn wire(typical_fs: u32) -> Self {
+    pub const fn wire(typical: Time) -> Self {
         OwnDelay {
-            typical_fs,
+            typical,
             spread: None,
             model: DelayModel::Transport,
             mismatches: false,
@@ -47,12 +48,9 @@ impl OwnDelay {
     pub(crate) fn delays(&self, path: impl FnOnce() -> String, corner: Corner) -> CellDelays {
         // A spread is that of the element, whatever it is made of: of an inverter's size in the law of areas.
         let own = self.spread.map_or(1.0, |spread| spread.factor(&path(), 2));
-        let typical_fs = (f64::from(self.typical_fs) * own).round() as u32;
-        let fs = Delay::scaled(typical_fs).in_corner_fs(corner);
-        let arc = ArcDelay {
-            rise_fs: fs,
-            fall_fs: fs,
-        };
+        let typical = Time::from_fs((self.typical.as_fs() as f64 * own).round() as i64);
+        let delay = Delay::scaled(typical).in_corner(corner);
+        let arc = ArcDelay::new(delay, delay);
         [[arc; MAX_OUTPUTS]; MAX_INPUTS]
     }
 }

@@ -131,7 +131,7 @@ impl<'n> Requirements<'n> {
 
     fn add(&mut self, cell: CellId, kind: CellKind, library: &Library, corner: Corner) {
         let limits = library.checks(kind);
-        let limit = |check, edge| Time::from_fs(limits.edge_limit_fs(check, edge, corner).into());
+        let limit = |check, edge| limits.edge_limit(check, edge, corner);
         let leaf = &self.netlist.cells()[cell.index()];
         let (data, clock) = (leaf.input(0), leaf.input(1));
         for launch in Edge::BOTH {
@@ -271,8 +271,7 @@ mod tests {
             delay(CellKind::Inv, 0, Logic::Zero),
         );
         let limits = library.checks(CellKind::Dffr);
-        let limit =
-            |kind, edge| Time::from_fs(limits.edge_limit_fs(kind, edge, Corner::Typ).into());
+        let limit = |kind, edge| limits.edge_limit(kind, edge, Corner::Typ);
         let setup = (rise + limit(CheckKind::Setup, Edge::Rise))
             .max(fall + limit(CheckKind::Setup, Edge::Fall));
         assert_eq!(need(false, CheckKind::Setup), (2, clock_to_q + setup));
@@ -306,14 +305,10 @@ mod tests {
             let limit =
                 library
                     .checks(CellKind::Dffr)
-                    .edge_limit_fs(CheckKind::Hold, edge, Corner::Typ);
+                    .edge_limit(CheckKind::Hold, edge, Corner::Typ);
             let arc = library.arcs(CellKind::Dffr)[1][1];
-            let to_qn = arc.delay_fs(Corner::Typ, edge.level());
-            assert_eq!(
-                need.as_fs(),
-                i64::from(limit) - i64::from(to_qn),
-                "{edge:?}"
-            );
+            let to_qn = arc.delay(Corner::Typ, edge.level());
+            assert_eq!(need, limit - to_qn, "{edge:?}");
         }
     }
 

@@ -2,10 +2,11 @@
 
 use std::collections::HashMap;
 
-use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, SkippedEntry};
-use crate::InputError;
+use super::error::{SdfError, SdfFault, SdfPart, pins};
+use super::skipped::{SkippedEntry, SkippedKind};
+use super::{DelayPath, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance};
 use crate::netlist::{
-    ArcDelay, CellId, CellKind, Chain, Corner, Edge, MAX_INPUTS, Netlist, Timing,
+    ArcDelay, CellId, CellKind, Chain, Corner, Direction, Edge, MAX_INPUTS, Netlist, Timing,
 };
 use crate::units::Time;
 
@@ -31,14 +32,12 @@ impl Annotation {
     }
 }
 
-const LONGEST_ARC: &str = "arcs with several delays, of which the longest is used";
-
 /// Puts delays and limits of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of
 /// them. Wires of an earlier annotation count as part of the arcs.
 ///
 /// # Errors
 /// Unknown instances, cell types and pins, wires between pins that are not connected, and sums that are
-/// negative or beyond 4.29 µs: line, reason and cure. `timing` is then only partly annotated.
+/// negative or beyond 4.29 µs, each with its line. `timing` is then only partly annotated.
 ///
 /// # Example
 ///
@@ -71,7 +70,7 @@ pub fn annotate(
     netlist: &Netlist,
     sdf: &Sdf<'_>,
     corner: Corner,
-) -> Result<Annotation, InputError> {
+) -> Result<Annotation, SdfError> {
     let mut annotator = Annotator {
         netlist,
         of_kind: cells_by_kind(netlist),
@@ -121,30 +120,27 @@ pub(super) struct Annotator<'n, 's, 'a> {
 }
 
 impl Annotator<'_, '_, '_> {
-    pub(super) fn error<T>(
-        &self,
-        line: usize,
-        message: impl Into<String>,
-    ) -> Result<T, InputError> {
-        Err(InputError::at_line(&self.sdf.source, line, message))
+    pub(super) fn error<T>(&self, line: usize, fault: SdfFault) -> Result<T, SdfError> {
+        Err(SdfError {
+            source_name: self.sdf.source.clone(),
+            line,
+            fault,
+        })
     }
 
-    pub(super) fn note(&mut self, what: &'static str, line: usize) {
+    pub(super) fn note(&mut self, what: SkippedKind, line: usize) {
         SkippedEntry::count(&mut self.result.notes, what, line);
     }
 
-    fn cell(&mut self, timing: &mut Timing, entry: &SdfCell<'_>) -> Result<(), InputError> {
+    fn cell(&mut self, timing: &mut Timing, entry: &SdfCell<'_>) -> Result<(), SdfError> {
         let kind = CellKind::ALL
             .into_iter()
             .find(|k| k.name() == entry.cell_type);
         match (&entry.instance, kind) {
-            (SdfInstance::Every, None) => self.error(
-                entry.line,
-                format!(
-                    "the library has no cell {}; correct CELLTYPE",
-                    entry.cell_type
-                ),
-            ),
+            (SdfInstance::Every, None) => {
+                let cell_type = entry.cell_type.to_owned();
+                self.error(entry.line, SdfFault::UnknownCellType { cell_type })
+            }
             (SdfInstance::Every, Some(kind)) => {
                 let cells = self.of_kind.get(&kind).cloned();
                 for cell in cells.unwrap_or_default() {
@@ -153,12 +149,12 @@ impl Annotator<'_, '_, '_> {
                 Ok(())
             }
             (SdfInstance::Path(path), _) => {
-                let (name, wanted) = if let Some(cell) = self.netlist.cell(path) {
+                let actual = if let Some(cell) = self.netlist.cell(path) {
                     let name = self.netlist.cells()[cell.index()].kind.name();
                     if name == entry.cell_type {
                         return self.leaf(timing, entry, cell);
                     }
-                    (path.as_ref(), name)
+                    name
                 } else if let Some(stage) = Chain::find(self.netlist, path) {
                     return self.stage(timing, entry, stage);
                 } else if let Some(scope) = self.netlist.scope(path) {
@@ -166,27 +162,26 @@ impl Annotator<'_, '_, '_> {
                     if name == entry.cell_type {
                         return self.module(entry, path);
                     }
-                    (if path.is_empty() { "the top" } else { path }, name)
+                    name
                 } else {
-                    return self.error(
-                        entry.line,
-                        match self.alternative_path(path) {
-                            Some(meant) => format!(
-                                "the chip has no instance {path}, but has {meant}; give paths below its top and the right DIVIDER"
-                            ),
-                            None => format!(
-                                "the chip has no instance {path}; give a path below its top and the right DIVIDER, and an array with as many rows and columns"
-                            ),
-                        },
-                    );
+                    let fault = SdfFault::UnknownInstance {
+                        alternative: self.alternative_path(path),
+                        path: path.to_string(),
+                    };
+                    return self.error(entry.line, fault);
                 };
-                self.error(
-                    entry.line,
-                    format!(
-                        "{name} is a {wanted} and no {}; correct CELLTYPE or INSTANCE",
-                        entry.cell_type
-                    ),
-                )
+                let part = if path.is_empty() {
+                    SdfPart::Top
+                } else {
+                    SdfPart::Instance(path.to_string())
+                };
+                let (actual, stated) = (actual.to_owned(), entry.cell_type.to_owned());
+                let fault = SdfFault::WrongCellType {
+                    part,
+                    actual,
+                    stated,
+                };
+                self.error(entry.line, fault)
             }
         }
     }
@@ -207,16 +202,13 @@ impl Annotator<'_, '_, '_> {
         below.find(is_there).map(str::to_owned)
     }
 
-    fn module(&mut self, entry: &SdfCell<'_>, path: &str) -> Result<(), InputError> {
+    fn module(&mut self, entry: &SdfCell<'_>, path: &str) -> Result<(), SdfError> {
         for delay in &entry.delays {
             match &delay.path {
                 DelayPath::Interconnect(from, to) => self.interconnect(path, delay, from, to)?,
                 _ => {
-                    let message = format!(
-                        "{} is a module, which has no delays but INTERCONNECT; name one of its cells",
-                        entry.cell_type
-                    );
-                    return self.error(delay.line, message);
+                    let module = entry.cell_type.to_owned();
+                    return self.error(delay.line, SdfFault::DelayOfModule { module });
                 }
             }
         }
@@ -228,7 +220,7 @@ impl Annotator<'_, '_, '_> {
         timing: &mut Timing,
         entry: &SdfCell<'_>,
         cell: CellId,
-    ) -> Result<(), InputError> {
+    ) -> Result<(), SdfError> {
         self.limits(timing, entry, cell)?;
         let kind = self.netlist.cells()[cell.index()].kind;
         let mut slots: [ArcSlots; MAX_INPUTS] = Default::default();
@@ -264,8 +256,7 @@ impl Annotator<'_, '_, '_> {
                     self.wire(cell, pin, delay);
                 }
                 DelayPath::Interconnect(..) => {
-                    let message = "a cell has no wires inside; move INTERCONNECT to the CELL of its module or of the top";
-                    return self.error(delay.line, message);
+                    return self.error(delay.line, SdfFault::WireInCell);
                 }
             }
         }
@@ -294,7 +285,7 @@ impl Annotator<'_, '_, '_> {
             self.result.arcs += given as usize;
             changed |= given;
             if ambiguous {
-                self.note(LONGEST_ARC, last_line[pin]);
+                self.note(SkippedKind::SeveralDelays, last_line[pin]);
             }
         }
         if changed && delays != *timing.cell_delays(cell) {
@@ -317,7 +308,7 @@ impl Annotator<'_, '_, '_> {
                 continue;
             }
             for (slot, (value, before)) in slot.iter_mut().zip(values) {
-                if let Some(fs) = value.in_corner_fs(self.corner).map(Time::as_fs) {
+                if let Some(fs) = value.in_corner(self.corner).map(Time::as_fs) {
                     *slot = Some(if delay.increment {
                         slot.unwrap_or(before as i64) + fs
                     } else {
@@ -328,13 +319,8 @@ impl Annotator<'_, '_, '_> {
         }
     }
 
-    pub(super) fn input(
-        &self,
-        kind: CellKind,
-        name: &str,
-        line: usize,
-    ) -> Result<usize, InputError> {
-        self.pin(kind, kind.inputs(), "input", name, line)
+    pub(super) fn input(&self, kind: CellKind, name: &str, line: usize) -> Result<usize, SdfError> {
+        self.pin(kind, Direction::Input, name, line)
     }
 
     pub(super) fn output(
@@ -342,28 +328,28 @@ impl Annotator<'_, '_, '_> {
         kind: CellKind,
         name: &str,
         line: usize,
-    ) -> Result<usize, InputError> {
-        self.pin(kind, kind.outputs(), "output", name, line)
+    ) -> Result<usize, SdfError> {
+        self.pin(kind, Direction::Output, name, line)
     }
 
     fn pin(
         &self,
         kind: CellKind,
-        pins: &[&str],
-        side: &str,
+        direction: Direction,
         name: &str,
         line: usize,
-    ) -> Result<usize, InputError> {
-        match pins.iter().position(|p| *p == name) {
+    ) -> Result<usize, SdfError> {
+        let mut pins = pins(kind, direction).iter();
+        match pins.position(|pin| *pin == name) {
             Some(pin) => Ok(pin),
-            None => self.error(
-                line,
-                format!(
-                    "{} has no {side} pin {name}; give {}",
-                    kind.name(),
-                    pins.join(" or ")
-                ),
-            ),
+            None => {
+                let fault = SdfFault::UnknownPin {
+                    kind,
+                    direction,
+                    pin: name.to_owned(),
+                };
+                self.error(line, fault)
+            }
         }
     }
 
@@ -374,7 +360,7 @@ impl Annotator<'_, '_, '_> {
         pin: usize,
         from: &PinEdge<'_>,
         line: usize,
-    ) -> Result<(), InputError> {
+    ) -> Result<(), SdfError> {
         let edges = match from.edge {
             Some(edge) => vec![edge],
             None => Edge::BOTH.to_vec(),
@@ -384,21 +370,17 @@ impl Annotator<'_, '_, '_> {
         if edges.iter().any(does_something) {
             return Ok(());
         }
-        let message = match from.edge {
-            None => format!("{} of {} changes no output", from.pin, kind.name()),
-            Some(_) => format!(
-                "this edge of {} of {} changes no output",
-                from.pin,
-                kind.name()
-            ),
+        let fault = SdfFault::NoEffect {
+            kind,
+            pin: from.pin.to_string(),
+            edge: from.edge,
         };
-        self.error(line, message + "; remove this IOPATH")
+        self.error(line, fault)
     }
 
-    pub(super) fn out_of_range<T>(&self, line: usize, fs: i64) -> Result<T, InputError> {
-        let message =
-            format!("the delay becomes {fs} fs; keep what is added up between 0 and 4.29 µs");
-        self.error(line, message)
+    pub(super) fn out_of_range<T>(&self, line: usize, fs: i64) -> Result<T, SdfError> {
+        let delay = Time::from_fs(fs);
+        self.error(line, SdfFault::DelayOutOfRange { delay })
     }
 }
 

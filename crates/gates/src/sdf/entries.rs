@@ -2,9 +2,11 @@
 
 use std::borrow::Cow;
 
+use super::error::{SdfExpected, SdfFault};
 use super::parser::{Parser, Result};
+use super::skipped::{SkippedEntry, SkippedKind};
 use super::tokens::Token;
-use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, SkippedEntry, Triple};
+use super::{CheckKeyword, DelayPath, PinEdge, SdfCheck, SdfDelay, Triple};
 use crate::netlist::Edge;
 use crate::units::Time;
 
@@ -27,16 +29,16 @@ impl<'a> Parser<'a, '_> {
                 let path = match keyword.as_str() {
                     "IOPATH" => {
                         let from = self.pin_edge()?;
-                        DelayPath::IoPath(from, self.name("an output pin")?)
+                        DelayPath::IoPath(from, self.name(SdfExpected::OutputPin)?)
                     }
                     "DEVICE" => DelayPath::Device(match self.peek()? {
-                        Token::Word(_) => Some(self.name("an output pin")?),
+                        Token::Word(_) => Some(self.name(SdfExpected::OutputPin)?),
                         _ => None,
                     }),
-                    "PORT" => DelayPath::Port(self.name("an input pin")?),
+                    "PORT" => DelayPath::Port(self.name(SdfExpected::InputPin)?),
                     "INTERCONNECT" => {
-                        let from = self.name("a driving pin")?;
-                        DelayPath::Interconnect(from, self.name("a driven pin")?)
+                        let from = self.name(SdfExpected::DrivingPin)?;
+                        DelayPath::Interconnect(from, self.name(SdfExpected::DrivenPin)?)
                     }
                     other => {
                         self.leave_out(other)?;
@@ -63,7 +65,7 @@ impl<'a> Parser<'a, '_> {
         while self.is_next(Token::Open)? {
             self.next_token()?;
             if matches!(self.peek()?, Token::Word(w) if w.eq_ignore_ascii_case("RETAIN")) {
-                SkippedEntry::count(&mut self.skipped, "RETAIN", self.line);
+                SkippedEntry::count(&mut self.skipped, SkippedKind::Retain, self.line);
                 self.skip_list()?;
                 continue;
             }
@@ -71,7 +73,7 @@ impl<'a> Parser<'a, '_> {
                 self.next_token()?;
                 let value = self.triple()?;
                 if !self.is_next(Token::Close)? {
-                    SkippedEntry::count(&mut self.skipped, "pulse limits", self.line);
+                    SkippedEntry::count(&mut self.skipped, SkippedKind::PulseLimits, self.line);
                 }
                 self.skip_list()?;
                 value
@@ -79,19 +81,19 @@ impl<'a> Parser<'a, '_> {
                 self.triple()?
             };
             if !may_be_negative && value.0.iter().flatten().any(|&time| time < Time::ZERO) {
-                return self.error("an absolute delay is negative; give 0 or more");
+                return self.error(SdfFault::NegativeDelay);
             }
             values.push(value);
             if values.len() > 12 {
-                return self.error("a delay has more than 12 values; give 1, 2, 3, 6 or 12");
+                return self.error(SdfFault::TooManyValues);
             }
         }
         self.close()?;
         if values.len() > 2 {
-            SkippedEntry::count(&mut self.skipped, "transitions to and from Z", self.line);
+            SkippedEntry::count(&mut self.skipped, SkippedKind::OtherTransitions, self.line);
         }
         match values[..] {
-            [] => self.error("a delay has no value; give it one in parentheses"),
+            [] => self.error(SdfFault::NoValue),
             [both] => Ok((both, both)),
             [rise, fall, ..] => Ok((rise, fall)),
         }
@@ -108,12 +110,12 @@ impl<'a> Parser<'a, '_> {
                 Token::Word(word) if members[at].is_none() => {
                     members[at] = Some(Time::from_fs(self.number(word)?));
                 }
-                token => return self.unexpected(token, "a number, min:typ:max or )"),
+                token => return self.unexpected(token, SdfExpected::Value),
             }
         }
         match at {
             0 => Ok(Triple([members[0]; 3])),
-            1 => self.error("two numbers are no delay; give one or min:typ:max"),
+            1 => self.error(SdfFault::TwoNumbers),
             _ => Ok(Triple(members)),
         }
     }
@@ -123,35 +125,31 @@ impl<'a> Parser<'a, '_> {
             .bytes()
             .all(|b| b.is_ascii_digit() || matches!(b, b'+' | b'-' | b'.' | b'e' | b'E'));
         let Some(value) = word.parse::<f64>().ok().filter(|_| is_decimal) else {
-            return self.unexpected(Token::Word(word), "a number");
+            return self.unexpected(Token::Word(word), SdfExpected::Number);
         };
         // Below 2³² fs, 53 bits hold every decimal fraction to far less than half a femtosecond.
         let fs = value * self.header.timescale.as_fs() as f64;
         if fs.is_finite() && fs.abs() <= LONGEST_FS {
             Ok(fs.round() as i64)
         } else {
-            self.error(format!(
-                "{word} is beyond ±4.29 µs in this time scale; correct it or TIMESCALE"
-            ))
+            let number = word.to_owned();
+            self.error(SdfFault::NumberTooLarge { number })
         }
     }
 
     /// `PIN`, `(posedge PIN)` or `(negedge PIN)`.
     fn pin_edge(&mut self) -> Result<PinEdge<'a>> {
         if !self.is_next(Token::Open)? {
-            let pin = self.name("a pin")?;
+            let pin = self.name(SdfExpected::Pin)?;
             return Ok(PinEdge { edge: None, pin });
         }
         self.next_token()?;
-        let edge = match self.word("an edge")?.to_ascii_lowercase().as_str() {
+        let edge = match self.word(SdfExpected::Edge)?.to_ascii_lowercase().as_str() {
             "posedge" | "01" => Edge::Rise,
             "negedge" | "10" => Edge::Fall,
-            _ => {
-                return self
-                    .error("the edge is neither posedge nor negedge; choose one of the two");
-            }
+            _ => return self.error(SdfFault::UnknownEdge),
         };
-        let pin = self.name("a pin")?;
+        let pin = self.name(SdfExpected::Pin)?;
         self.close()?;
         let edge = Some(edge);
         Ok(PinEdge { edge, pin })
@@ -179,14 +177,14 @@ impl<'a> Parser<'a, '_> {
         }
         while let Some(keyword) = self.entry()? {
             if !matches!(keyword.as_str(), "SCOND" | "CCOND") {
-                return self.error(format!("{keyword} does not belong in a check; remove it"));
+                return self.error(SdfFault::EntryInCheck { keyword });
             }
             conditional = true;
             self.skip_list()?;
         }
         // A check that holds only sometimes must not become one that always does.
         if conditional {
-            SkippedEntry::count(&mut self.skipped, "COND", line);
+            SkippedEntry::count(&mut self.skipped, SkippedKind::Cond, line);
             return Ok(None);
         }
         Ok(Some(SdfCheck {

@@ -11,13 +11,11 @@
 //! (15.8) has it for simulators without delayed copies of the pins.
 
 use super::annotate::Annotator;
+use super::error::{SdfError, SdfFault};
+use super::skipped::SkippedKind;
 use super::{CheckKeyword as Entry, PinEdge, SdfCell, SdfCheck, Triple};
-use crate::InputError;
 use crate::netlist::{CellId, CellKind, CheckKind, Control, Edge, InstanceLimits, Timing};
 use crate::units::Time;
-
-const NO_SUCH_CHECK: &str = "checks of pins or edges that a flip-flop does not act on";
-const NEGATIVE: &str = "negative limits, which become 0";
 
 /// A pin of a flip-flop.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -48,32 +46,31 @@ impl Annotator<'_, '_, '_> {
         timing: &mut Timing,
         entry: &SdfCell<'_>,
         cell: CellId,
-    ) -> Result<(), InputError> {
+    ) -> Result<(), SdfError> {
         let kind = self.netlist.cells()[cell.index()].kind;
         let before = *timing.limits(cell, kind);
         let mut limits = before;
         for check in &entry.checks {
             if !kind.is_flip_flop() {
-                let message = format!("{} has no timing checks; remove this one", kind.name());
-                return self.error(check.line, message);
+                return self.error(check.line, SdfFault::CheckOfGate { kind });
             }
             for pin in std::iter::once(&check.pin).chain(&check.reference) {
                 self.input(kind, &pin.pin, check.line)?;
             }
             let slots = slots(check);
             if slots.iter().all(Option::is_none) {
-                self.note(NO_SUCH_CHECK, check.line);
+                self.note(SkippedKind::NoSuchCheck, check.line);
                 continue;
             }
             self.result.checks += usize::from(check.has_value(self.corner));
             // Two limits are one for each of two slots; one limit may be for both.
             let of_slot = [0, check.kind.limits() - 1].map(|limit| check.limits[limit]);
             for (slot, limit) in slots.into_iter().zip(of_slot) {
-                let (Some(slot), Some(limit)) = (slot, limit.in_corner_fs(self.corner)) else {
+                let (Some(slot), Some(limit)) = (slot, limit.in_corner(self.corner)) else {
                     continue;
                 };
                 if limit < Time::ZERO {
-                    self.note(NEGATIVE, check.line);
+                    self.note(SkippedKind::NegativeLimit, check.line);
                 }
                 // The parser lets nothing beyond 32 bits through.
                 enter(&mut limits, slot, u32::try_from(limit.as_fs()).unwrap_or(0));

@@ -41,8 +41,10 @@
 
 mod annotate;
 mod entries;
+mod error;
 mod limits;
 mod parser;
+mod skipped;
 mod stages;
 mod suspect_delays;
 #[cfg(test)]
@@ -52,7 +54,9 @@ mod wires;
 mod writer;
 
 pub use annotate::{Annotation, annotate};
+pub use error::{SdfError, SdfExpected, SdfFault, SdfPart, SdfToken};
 pub(super) use limits::checks_of;
+pub use skipped::{SkippedEntry, SkippedKind};
 pub use suspect_delays::{SuspectDelay, suspect_delays};
 pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_library_sdf, write_sdf};
 
@@ -81,7 +85,7 @@ impl Triple {
     }
 
     /// The member of one corner.
-    pub const fn in_corner_fs(self, corner: Corner) -> Option<Time> {
+    pub const fn in_corner(self, corner: Corner) -> Option<Time> {
         self.0[corner as usize]
     }
 }
@@ -128,7 +132,7 @@ impl SdfDelay<'_> {
     pub fn has_value(&self, corner: Corner) -> bool {
         [self.rise, self.fall]
             .iter()
-            .any(|value| value.in_corner_fs(corner).is_some())
+            .any(|value| value.in_corner(corner).is_some())
     }
 }
 
@@ -205,7 +209,7 @@ impl SdfCheck<'_> {
     pub fn has_value(&self, corner: Corner) -> bool {
         self.limits
             .iter()
-            .any(|limit| limit.in_corner_fs(corner).is_some())
+            .any(|limit| limit.in_corner(corner).is_some())
     }
 }
 
@@ -244,30 +248,6 @@ pub struct SdfHeader<'a> {
     pub divider: char,
     /// What 1 stands for.
     pub timescale: Time,
-}
-
-/// Something left out of a file or an annotation.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SkippedEntry {
-    /// What it was.
-    pub what: &'static str,
-    /// How often.
-    pub count: usize,
-    /// Line of the first.
-    pub first_line: usize,
-}
-
-impl SkippedEntry {
-    fn count(list: &mut Vec<SkippedEntry>, what: &'static str, line: usize) {
-        match list.iter_mut().find(|s| s.what == what) {
-            Some(skipped) => skipped.count += 1,
-            None => list.push(SkippedEntry {
-                what,
-                count: 1,
-                first_line: line,
-            }),
-        }
-    }
 }
 
 /// A delay file; it borrows the text.

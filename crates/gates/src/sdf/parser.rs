@@ -2,9 +2,10 @@
 
 use std::borrow::Cow;
 
+use super::error::{SdfError, SdfExpected, SdfFault, SdfToken};
+use super::skipped::{SkippedEntry, SkippedKind};
 use super::tokens::{Token, Tokens};
-use super::{Sdf, SdfCell, SdfHeader, SdfInstance, SkippedEntry};
-use crate::InputError;
+use super::{Sdf, SdfCell, SdfHeader, SdfInstance};
 use crate::units::Time;
 
 const HEADER_TEXTS: [&str; 9] = [
@@ -19,28 +20,26 @@ const HEADER_TEXTS: [&str; 9] = [
     "TEMPERATURE",
 ];
 
-/// Entries among delays and checks that are not modelled.
-const LEFT_OUT: [&str; 11] = [
-    "COND",
-    "CONDELSE",
-    "PATHPULSE",
-    "PATHPULSEPERCENT",
-    "NETDELAY",
-    "PERIOD",
-    "SKEW",
-    "BIDIRECTSKEW",
-    "NOCHANGE",
-    "LABEL",
-    "TIMINGENV",
-];
-
-pub(super) type Result<T> = std::result::Result<T, InputError>;
+pub(super) type Result<T> = std::result::Result<T, SdfError>;
 
 impl<'a> Sdf<'a> {
     /// Reads a delay file; `source` names it in complaints.
     ///
     /// # Errors
-    /// What is malformed or of an unknown kind: line, reason and cure.
+    /// What is malformed or of an unknown kind, with its line.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use femtogate::sdf::{Sdf, SdfFault};
+    ///
+    /// let error = Sdf::parse("layout.sdf", "(DELAYFILE\n  (DIVIDER x))").unwrap_err();
+    /// assert_eq!((error.line, &error.fault), (2, &SdfFault::UnknownDivider));
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "layout.sdf:2: the divider is neither . nor /; choose one of the two"
+    /// );
+    /// ```
     pub fn parse(source: &str, text: &'a str) -> Result<Self> {
         let mut parser = Parser {
             source,
@@ -75,15 +74,22 @@ pub(super) struct Parser<'a, 's> {
 }
 
 impl<'a> Parser<'a, '_> {
-    pub(super) fn error<T>(&self, message: impl Into<String>) -> Result<T> {
-        Err(InputError::at_line(self.source, self.line, message))
+    pub(super) fn error<T>(&self, fault: SdfFault) -> Result<T> {
+        Err(self.error_at(self.line, fault))
+    }
+
+    fn error_at(&self, line: usize, fault: SdfFault) -> SdfError {
+        SdfError {
+            source_name: self.source.to_owned(),
+            line,
+            fault,
+        }
     }
 
     pub(super) fn peek(&mut self) -> Result<Token<'a>> {
         if self.ahead.is_none() {
             let next = self.tokens.next();
-            let next =
-                next.map_err(|(line, message)| InputError::at_line(self.source, line, message))?;
+            let next = next.map_err(|(line, fault)| self.error_at(line, fault))?;
             self.ahead = Some(next);
         }
         Ok(self.ahead.map_or(Token::End, |(token, _)| token))
@@ -97,44 +103,48 @@ impl<'a> Parser<'a, '_> {
         Ok(token)
     }
 
-    pub(super) fn unexpected<T>(&self, token: Token<'_>, wanted: &str) -> Result<T> {
+    pub(super) fn unexpected<T>(&self, token: Token<'_>, expected: SdfExpected) -> Result<T> {
         let found = match token {
-            Token::Open => "(".to_owned(),
-            Token::Close => ")".to_owned(),
-            Token::Colon => ":".to_owned(),
-            Token::Text(text) => format!("{text:?}"),
-            Token::Word(word) => word.chars().take(60).collect(),
-            Token::End => "the end of the file".to_owned(),
+            Token::Open => SdfToken::Open,
+            Token::Close => SdfToken::Close,
+            Token::Colon => SdfToken::Colon,
+            Token::Text(text) => SdfToken::Text(text.to_owned()),
+            Token::Word(word) => SdfToken::Word(beginning(word)),
+            Token::End => SdfToken::End,
         };
-        self.error(format!(
-            "found {found} where {wanted} belongs; give an SDF file, or write this one anew"
-        ))
+        self.error(SdfFault::UnexpectedToken { found, expected })
     }
 
     pub(super) fn is_next(&mut self, token: Token<'_>) -> Result<bool> {
         Ok(self.peek()? == token)
     }
 
-    fn expect(&mut self, token: Token<'_>, name: &str) -> Result<()> {
+    fn expect(&mut self, token: Token<'_>, expected: SdfExpected) -> Result<()> {
         match self.next_token()? {
             t if t == token => Ok(()),
-            t => self.unexpected(t, name),
+            t => self.unexpected(t, expected),
         }
     }
 
     pub(super) fn open(&mut self) -> Result<()> {
-        self.expect(Token::Open, "(")
+        self.expect(Token::Open, SdfExpected::Open)
     }
 
     pub(super) fn close(&mut self) -> Result<()> {
-        self.expect(Token::Close, ")")
+        self.expect(Token::Close, SdfExpected::Close)
     }
 
-    pub(super) fn word(&mut self, wanted: &str) -> Result<&'a str> {
+    pub(super) fn word(&mut self, expected: SdfExpected) -> Result<&'a str> {
         match self.next_token()? {
             Token::Word(word) => Ok(word),
-            token => self.unexpected(token, wanted),
+            token => self.unexpected(token, expected),
         }
+    }
+
+    /// Takes a word, and says whether it is this keyword.
+    fn is_keyword(&mut self, keyword: &'static str) -> Result<bool> {
+        let word = self.word(SdfExpected::Keyword(keyword))?;
+        Ok(word.eq_ignore_ascii_case(keyword))
     }
 
     /// `(KEYWORD`, in capitals, or nothing where the list is closed.
@@ -144,7 +154,9 @@ impl<'a> Parser<'a, '_> {
             return Ok(None);
         }
         self.open()?;
-        Ok(Some(self.word("a keyword")?.to_ascii_uppercase()))
+        Ok(Some(
+            self.word(SdfExpected::AnyKeyword)?.to_ascii_uppercase(),
+        ))
     }
 
     /// Everything up to the parenthesis that closes the present list.
@@ -154,7 +166,7 @@ impl<'a> Parser<'a, '_> {
             match self.next_token()? {
                 Token::Open => depth += 1,
                 Token::Close => depth -= 1,
-                Token::End => return self.unexpected(Token::End, ")"),
+                Token::End => return self.unexpected(Token::End, SdfExpected::Close),
                 _ => {}
             }
         }
@@ -163,26 +175,21 @@ impl<'a> Parser<'a, '_> {
 
     /// Leaves out an entry that is known and not modelled; refuses any other.
     pub(super) fn leave_out(&mut self, keyword: &str) -> Result<()> {
-        match LEFT_OUT.iter().find(|k| **k == keyword) {
-            Some(what) => {
-                SkippedEntry::count(&mut self.skipped, what, self.line);
+        match SkippedKind::from_keyword(keyword) {
+            Some(kind) => {
+                SkippedEntry::count(&mut self.skipped, kind, self.line);
                 self.skip_list()
             }
-            None => {
-                let keyword: String = keyword.chars().take(60).collect();
-                self.error(format!(
-                    "{keyword} is not an entry of SDF that belongs here; remove it"
-                ))
-            }
+            None => self.error(SdfFault::UnknownEntry {
+                keyword: beginning(keyword),
+            }),
         }
     }
 
     fn file(&mut self) -> Result<Vec<SdfCell<'a>>> {
         self.open()?;
-        if !self.word("DELAYFILE")?.eq_ignore_ascii_case("DELAYFILE") {
-            return self.error(
-                "this is not an SDF file, which begins with (DELAYFILE; give one that does",
-            );
+        if !self.is_keyword("DELAYFILE")? {
+            return self.error(SdfFault::NoDelayFile);
         }
         let mut cells = Vec::new();
         while let Some(keyword) = self.entry()? {
@@ -191,37 +198,31 @@ impl<'a> Parser<'a, '_> {
             } else if cells.is_empty() {
                 self.header_entry(&keyword)?;
             } else {
-                return self.error(format!(
-                    "{keyword} follows a CELL; move it to the head of the file"
-                ));
+                return self.error(SdfFault::EntryAfterCell { keyword });
             }
         }
-        self.expect(Token::End, "the end of the file")?;
+        self.expect(Token::End, SdfExpected::End)?;
         Ok(cells)
     }
 
     fn header_entry(&mut self, keyword: &str) -> Result<()> {
         match keyword {
             "DIVIDER" => {
-                self.header.divider = match self.word("a divider")? {
+                self.header.divider = match self.word(SdfExpected::Divider)? {
                     "." => '.',
                     "/" => '/',
-                    _ => {
-                        return self.error("the divider is neither . nor /; choose one of the two");
-                    }
+                    _ => return self.error(SdfFault::UnknownDivider),
                 };
                 self.close()
             }
             "TIMESCALE" => {
-                let mut text = self.word("a time scale")?.to_owned();
+                let mut text = self.word(SdfExpected::Timescale)?.to_owned();
                 if let Token::Word(unit) = self.peek()? {
                     text += unit;
                     self.next_token()?;
                 }
                 let Some(scale) = timescale_fs(&text) else {
-                    return self.error(format!(
-                        "{text} is not a time scale; give 1, 10 or 100 and s, ms, us, ns, ps or fs"
-                    ));
+                    return self.error(SdfFault::UnknownTimescale { text });
                 };
                 self.header.timescale = Time::from_fs(scale);
                 self.close()
@@ -239,7 +240,7 @@ impl<'a> Parser<'a, '_> {
                         }
                         Token::Text(part) | Token::Word(part) => text.to_mut().push_str(part),
                         Token::Colon => text.to_mut().push(':'),
-                        token => return self.unexpected(token, ")"),
+                        token => return self.unexpected(token, SdfExpected::Close),
                     }
                 }
                 self.header.texts.push((name, text));
@@ -251,12 +252,12 @@ impl<'a> Parser<'a, '_> {
     fn cell(&mut self) -> Result<SdfCell<'a>> {
         let line = self.line;
         self.open()?;
-        if !self.word("CELLTYPE")?.eq_ignore_ascii_case("CELLTYPE") {
-            return self.error("a CELL begins with (CELLTYPE \"…\"); add its type");
+        if !self.is_keyword("CELLTYPE")? {
+            return self.error(SdfFault::NoCellType);
         }
         let cell_type = match self.next_token()? {
             Token::Text(name) => name,
-            token => return self.unexpected(token, "a quoted cell type"),
+            token => return self.unexpected(token, SdfExpected::CellType),
         };
         self.close()?;
         let mut cell = SdfCell {
@@ -269,9 +270,7 @@ impl<'a> Parser<'a, '_> {
         let mut has_instance = false;
         while let Some(keyword) = self.entry()? {
             match keyword.as_str() {
-                "INSTANCE" if has_instance => {
-                    return self.error("a second INSTANCE in one CELL; make it a CELL of its own");
-                }
+                "INSTANCE" if has_instance => return self.error(SdfFault::SecondInstance),
                 "INSTANCE" => {
                     has_instance = true;
                     if let Token::Word(word) = self.peek()? {
@@ -295,8 +294,8 @@ impl<'a> Parser<'a, '_> {
         Ok(cell)
     }
 
-    pub(super) fn name(&mut self, wanted: &str) -> Result<Cow<'a, str>> {
-        let word = self.word(wanted)?;
+    pub(super) fn name(&mut self, expected: SdfExpected) -> Result<Cow<'a, str>> {
+        let word = self.word(expected)?;
         Ok(self.path(word))
     }
 
@@ -322,6 +321,11 @@ impl<'a> Parser<'a, '_> {
         }
         Cow::Owned(path)
     }
+}
+
+/// As much of a word as a sentence has room for.
+fn beginning(word: &str) -> String {
+    word.chars().take(60).collect()
 }
 
 fn timescale_fs(text: &str) -> Option<i64> {

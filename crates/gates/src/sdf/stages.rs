@@ -1,8 +1,8 @@
 //! Stages of chains in a file: their delays are those of the cell that the netlist has, added up.
 
 use super::annotate::Annotator;
+use super::error::{SdfError, SdfFault, SdfPart};
 use super::{DelayPath, SdfCell};
-use crate::InputError;
 use crate::netlist::{ArcDelay, CellId, Chain, MAX_INPUTS, MAX_OUTPUTS, Timing};
 use crate::units::Time;
 
@@ -13,14 +13,15 @@ impl Annotator<'_, '_, '_> {
         timing: &Timing,
         entry: &SdfCell<'_>,
         (cell, chain, number): (CellId, Chain, usize),
-    ) -> Result<(), InputError> {
+    ) -> Result<(), SdfError> {
         let module = chain.stage_module();
         if module != entry.cell_type {
-            let message = format!(
-                "this stage of a delay is a {module} and no {}; correct CELLTYPE or INSTANCE",
-                entry.cell_type
-            );
-            return self.error(entry.line, message);
+            let fault = SdfFault::WrongCellType {
+                part: SdfPart::Stage,
+                actual: module,
+                stated: entry.cell_type.to_owned(),
+            };
+            return self.error(entry.line, fault);
         }
         for delay in &entry.delays {
             let is_its = |from: &str, to: &str| from == "A" && to == "Z";
@@ -29,8 +30,7 @@ impl Annotator<'_, '_, '_> {
                 _ => false,
             };
             if !is_path {
-                let message = "a stage of a delay has one path; give it an IOPATH A Z";
-                return self.error(delay.line, message);
+                return self.error(delay.line, SdfFault::StagePath);
             }
             let arc = timing.cell_delays(cell)[0][0];
             let (stages, line) = self.stages.entry(cell).or_insert_with(|| {
@@ -40,7 +40,7 @@ impl Annotator<'_, '_, '_> {
             });
             *line = delay.line;
             for (member, value) in stages[number].iter_mut().zip([delay.rise, delay.fall]) {
-                if let Some(fs) = value.in_corner_fs(self.corner).map(Time::as_fs) {
+                if let Some(fs) = value.in_corner(self.corner).map(Time::as_fs) {
                     *member = fs + if delay.increment { *member } else { 0 };
                 }
             }
@@ -51,7 +51,7 @@ impl Annotator<'_, '_, '_> {
     }
 
     /// Gives cells the sums of their stages' delays.
-    pub(super) fn add_stages(&mut self, timing: &mut Timing) -> Result<(), InputError> {
+    pub(super) fn add_stages(&mut self, timing: &mut Timing) -> Result<(), SdfError> {
         let mut chains: Vec<_> = std::mem::take(&mut self.stages).into_iter().collect();
         // In the order of the file, so that the first mistake is the one reported.
         chains.sort_unstable_by_key(|(cell, (_, line))| (*line, *cell));

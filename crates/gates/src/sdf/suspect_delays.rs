@@ -72,7 +72,7 @@ pub fn suspect_delays(sdf: &Sdf<'_>, corner: Corner) -> Vec<SuspectDelay> {
         is_of_cell && !delay.increment
     };
     let given =
-        |delay: &SdfDelay<'_>| [delay.rise, delay.fall].map(|delay| delay.in_corner_fs(corner));
+        |delay: &SdfDelay<'_>| [delay.rise, delay.fall].map(|delay| delay.in_corner(corner));
     let arcs = sdf.cells.iter().flat_map(|cell| &cell.delays);
     let arcs = arcs
         .filter(is_arc)

@@ -3,7 +3,6 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::InputError;
 use crate::netlist::{
     CellId, CellKind, Library, ModuleBuilder, Netlist, OwnDelay, ScopeId, Timing,
 };
@@ -61,7 +60,7 @@ pub(super) fn file(body: &str) -> String {
 }
 
 /// `body` annotated in the typical corner, and delays (rise, fall; fs) of one pin of a cell.
-pub(super) fn annotated(body: &str) -> Result<(Netlist, Timing, Annotation), crate::InputError> {
+pub(super) fn annotated(body: &str) -> Result<(Netlist, Timing, Annotation), SdfError> {
     let netlist = design();
     let mut timing = nominal(&netlist, Corner::Typ);
     let text = file(body);
@@ -172,7 +171,13 @@ fn delays_by_edge_go_where_the_edge_leads() {
 fn stages_of_a_chain_add_up_to_its_cell() {
     let mut m = ModuleBuilder::new("chip");
     let (a, z) = (m.input("A"), m.output("Z"));
-    m.cell_with_delay("line", CellKind::Buf, &[a], &[z], OwnDelay::wire(2_600_001));
+    m.cell_with_delay(
+        "line",
+        CellKind::Buf,
+        &[a],
+        &[z],
+        OwnDelay::wire(Time::from_fs(2_600_001)),
+    );
     let netlist = Netlist::elaborate(&m.finish().unwrap());
     let nominal = |corner| Timing::nominal(&netlist, &Library::generic_40nm(), corner);
     let delay = |body: &str| {
@@ -185,7 +190,7 @@ fn stages_of_a_chain_add_up_to_its_cell() {
             Corner::Typ,
         )?;
         let arc = timing.cell_delays(CellId::new(0))[0][0];
-        Ok::<_, InputError>((arc.rise_fs, arc.fall_fs))
+        Ok::<_, SdfError>((arc.rise_fs, arc.fall_fs))
     };
     let stage = |number: u32, cell_type: &str, entry: &str| {
         let delays = format!("(DELAY {entry})");
@@ -250,7 +255,11 @@ fn what_is_not_modelled_is_counted() {
             (HOLD (COND B A) (posedge B) (2)) (SETUP A B (1) ) ))",
     );
     let sdf = Sdf::parse("a.sdf", &text).unwrap();
-    let counts: Vec<_> = sdf.skipped.iter().map(|s| (s.what, s.count)).collect();
+    let counts: Vec<_> = sdf
+        .skipped
+        .iter()
+        .map(|s| (s.what.name(), s.count))
+        .collect();
     assert_eq!(
         counts,
         [
@@ -390,9 +399,10 @@ fn mistakes_are_named_with_line_and_cure() {
         let error = Sdf::parse("a.sdf", &text)
             .and_then(|sdf| annotate(&mut timing, &netlist, &sdf, Corner::Typ))
             .expect_err(&text);
-        assert_eq!(error.line, Some(line), "{text}: {error}");
+        assert_eq!(error.line, line, "{text}: {error}");
+        let message = error.fault.to_string();
         assert!(
-            error.message.contains(says) && error.message.contains(';'),
+            message.contains(says) && message.contains(';'),
             "{text}: {error}"
         );
     }

@@ -1,5 +1,7 @@
 //! SDF text as tokens with line numbers.
 
+use super::error::SdfFault;
+
 /// One token; words keep their escapes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Token<'a> {
@@ -40,8 +42,8 @@ impl<'a> Tokens<'a> {
         self.at += bytes;
     }
 
-    /// The next token and its line, or line, reason and cure.
-    pub(super) fn next(&mut self) -> Result<(Token<'a>, usize), (usize, String)> {
+    /// The next token and its line, or the line and what is wrong.
+    pub(super) fn next(&mut self) -> Result<(Token<'a>, usize), (usize, SdfFault)> {
         self.skip_blanks()?;
         let line = self.line;
         let single = |this: &mut Self, token| {
@@ -56,8 +58,7 @@ impl<'a> Tokens<'a> {
             Some(b'"') => {
                 let start = self.at + 1;
                 let Some(length) = self.text[start..].find('"') else {
-                    let message = "this quoted text has no end; close it with \"";
-                    return Err((line, message.to_owned()));
+                    return Err((line, SdfFault::UnclosedText));
                 };
                 self.step(length + 2);
                 Ok((Token::Text(&self.text[start..start + length]), line))
@@ -94,7 +95,7 @@ impl<'a> Tokens<'a> {
         length
     }
 
-    fn skip_blanks(&mut self) -> Result<(), (usize, String)> {
+    fn skip_blanks(&mut self) -> Result<(), (usize, SdfFault)> {
         loop {
             match self.rest() {
                 [b, ..] if b.is_ascii_whitespace() => self.step(1),
@@ -109,7 +110,7 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    fn skip_comment(&mut self) -> Result<(), (usize, String)> {
+    fn skip_comment(&mut self) -> Result<(), (usize, SdfFault)> {
         let line = self.line;
         let mut depth = 0;
         loop {
@@ -125,7 +126,7 @@ impl<'a> Tokens<'a> {
                         return Ok(());
                     }
                 }
-                [] => return Err((line, "this comment has no end; close it with */".to_owned())),
+                [] => return Err((line, SdfFault::UnclosedComment)),
                 _ => self.step(1),
             }
         }

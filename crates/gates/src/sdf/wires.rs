@@ -1,13 +1,10 @@
 //! Wire delays: where INTERCONNECT and PORT end, and how they are added to the arcs of that pin.
 
 use super::annotate::{Annotator, Wire, causes};
+use super::error::{SdfError, SdfFault};
+use super::skipped::SkippedKind;
 use super::{SdfDelay, join};
-use crate::InputError;
 use crate::netlist::{CellId, Direction, Edge, NetId, Timing};
-
-const WIRE_TO_D: &str = "wires to D of a flip-flop";
-const WIRE_TO_OUTPUT: &str = "wires to outputs of the chip";
-const UNEQUAL_WIRE: &str = "wires that rise and fall differently into a non-unate arc";
 
 impl Annotator<'_, '_, '_> {
     pub(super) fn interconnect(
@@ -16,7 +13,7 @@ impl Annotator<'_, '_, '_> {
         delay: &SdfDelay<'_>,
         from: &str,
         to: &str,
-    ) -> Result<(), InputError> {
+    ) -> Result<(), SdfError> {
         let source = self.net_of(scope, from, delay.line, Direction::Input)?;
         let target = join(scope, to);
         if let Some((instance, name)) = target.rsplit_once('.')
@@ -25,14 +22,14 @@ impl Annotator<'_, '_, '_> {
             let flat = self.netlist.cells()[cell.index()];
             let pin = self.input(flat.kind, name, delay.line)?;
             if source.is_none() || flat.inputs[pin] != source {
-                let message = format!("{from} and {to} are not connected; correct one of the two");
-                return self.error(delay.line, message);
+                let [from, to] = [from, to].map(str::to_owned);
+                return self.error(delay.line, SdfFault::NotConnected { from, to });
             }
             self.wire(cell, pin, delay);
             return Ok(());
         }
         self.net_of(scope, to, delay.line, Direction::Output)?;
-        self.note(WIRE_TO_OUTPUT, delay.line);
+        self.note(SkippedKind::WireToOutput, delay.line);
         Ok(())
     }
 
@@ -43,7 +40,7 @@ impl Annotator<'_, '_, '_> {
         path: &str,
         line: usize,
         port: Direction,
-    ) -> Result<Option<NetId>, InputError> {
+    ) -> Result<Option<NetId>, SdfError> {
         let full = join(scope, path);
         if let Some((instance, name)) = full.rsplit_once('.')
             && let Some(cell) = self.netlist.cell(instance)
@@ -59,23 +56,21 @@ impl Annotator<'_, '_, '_> {
             .any(|(direction, s)| direction == port && s.name == signal);
         match self.netlist.net(&full) {
             Some(net) if is_port => Ok(Some(net)),
-            _ => self.error(
-                line,
-                format!(
-                    "{path} is neither a pin of a cell nor a port of the chip that a wire could have here; correct it"
-                ),
-            ),
+            _ => {
+                let path = path.to_owned();
+                self.error(line, SdfFault::UnknownWireEnd { path })
+            }
         }
     }
 
     pub(super) fn wire(&mut self, cell: CellId, pin: usize, delay: &SdfDelay<'_>) {
         let kind = self.netlist.cells()[cell.index()].kind;
-        let values = [delay.rise, delay.fall].map(|triple| triple.in_corner_fs(self.corner));
+        let values = [delay.rise, delay.fall].map(|triple| triple.in_corner(self.corner));
         if !kind.triggers(pin) {
             let longest = values.into_iter().flatten().max().unwrap_or_default();
             let longest = self.result.longest_wire_to_d.max(longest);
             self.result.longest_wire_to_d = longest;
-            self.note(WIRE_TO_D, delay.line);
+            self.note(SkippedKind::WireToD, delay.line);
             return;
         }
         if values == [None; 2] {
@@ -97,7 +92,7 @@ impl Annotator<'_, '_, '_> {
         }
     }
 
-    pub(super) fn add_wires(&mut self, timing: &mut Timing) -> Result<(), InputError> {
+    pub(super) fn add_wires(&mut self, timing: &mut Timing) -> Result<(), SdfError> {
         let mut wires: Vec<_> = std::mem::take(&mut self.wires).into_iter().collect();
         // In the order of the file, so that the first mistake is the one reported.
         wires.sort_unstable_by_key(|((cell, pin), wire)| (wire.line, *cell, *pin));
@@ -125,7 +120,7 @@ impl Annotator<'_, '_, '_> {
                 *delay = fs;
             }
             if unequal {
-                self.note(UNEQUAL_WIRE, wire.line);
+                self.note(SkippedKind::UnequalWire, wire.line);
             }
             self.result.wires += 1;
             timing.set(cell, delays);

@@ -186,8 +186,8 @@ fn write_cell(
     let delays = |pin: usize, output: usize| {
         let arc = arcs[pin][output];
         (
-            arc.delay_fs(corner, Logic::One),
-            arc.delay_fs(corner, Logic::Zero),
+            arc.delay(corner, Logic::One).as_fs(),
+            arc.delay(corner, Logic::Zero).as_fs(),
         )
     };
     let uniform = (1..kind.inputs().len()).all(|pin| delays(pin, 0) == delays(0, 0));

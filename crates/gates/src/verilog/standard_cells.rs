@@ -165,8 +165,9 @@ pub fn write_standard_cells(
 /// A chain, and its stages with the delay that they have on average.
 fn write_chain(out: &mut dyn Write, chain: Chain) -> io::Result<()> {
     let stage = chain.stage_module();
-    let typical_fs = chain.parts(chain.typical_fs).last().unwrap_or(0);
-    let delay = Corner::ALL.map(|corner| Delay::scaled(typical_fs).in_corner_fs(corner));
+    let typical_fs = chain.parts(Delay::kept_fs(chain.typical)).last();
+    let typical = Time::from_fs(typical_fs.unwrap_or(0).into());
+    let delay = Corner::ALL.map(|corner| Delay::scaled(typical).in_corner_fs(corner));
     writeln!(
         out,
         "\nmodule {stage}(output Z, input A);\n  buf body(Z, A);"
@@ -280,7 +281,7 @@ fn write_specify(
 /// One check. SDF names the data first; in Verilog they come first where a control is released, and second for D.
 fn system_task(check: &SdfCheck<'_>, reader: Reader) -> String {
     let [first, second] = check.limits.map(|limit| {
-        let corners = Corner::ALL.map(|corner| limit.in_corner_fs(corner).map_or(0, Time::as_fs));
+        let corners = Corner::ALL.map(|corner| limit.in_corner(corner).map_or(0, Time::as_fs));
         reader.triple(corners)
     });
     let data = event(&check.pin);

@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use femtogate::netlist::{Netlist, ScopeId, Timing};
+use femtogate::netlist::{ArcDelay, Netlist, ScopeId, Timing};
+use femtogate::units::Time;
 use rand::{RngExt, rngs::StdRng};
 
 use crate::tool;
@@ -46,8 +47,10 @@ pub fn random_delays(netlist: &Netlist, nominal: &Timing, random: &mut StdRng) -
     for cell in netlist.cells_below(ScopeId::TOP) {
         let mut delays = *nominal.cell_delays(cell);
         for arc in delays.as_flattened_mut() {
-            arc.rise_fs = (arc.rise_fs as f64 * random.random_range(0.7..1.4)) as u32;
-            arc.fall_fs = (arc.fall_fs as f64 * random.random_range(0.7..1.4)) as u32;
+            let mut varied = |delay: Time| {
+                Time::from_fs((delay.as_fs() as f64 * random.random_range(0.7..1.4)) as i64)
+            };
+            *arc = ArcDelay::new(varied(arc.rise()), varied(arc.fall()));
         }
         timing.set(cell, delays);
     }

@@ -118,7 +118,7 @@ fn limits_of_a_flip_flop() {
     let slew = environment.input_slew_fs * 1e-6;
     let made = CharacterisedNetlist::new(&netlist, &library, &environment);
     let limits = made.timing.limits(CellId::new(0), CellKind::Dffr);
-    let limit = |kind, edge| limits.limit_fs(Control::Reset, kind, edge);
+    let limit = |kind, edge| limits.limit(Control::Reset, kind, edge).as_fs();
     for (kind, [rise_fs, fall_fs]) in [
         (CheckKind::Setup, [25_000, 30_000]),
         (CheckKind::Hold, [4_000, 2_000]),
@@ -130,7 +130,7 @@ fn limits_of_a_flip_flop() {
     }
     // The flip-flop's RN (1.2 fF) rises later than R falls.
     let late_fs = 1e6 * (1.06 * (0.006 + 4.2 * 0.0012) + 0.18 * slew);
-    let recovery_fs = f64::from(limit(CheckKind::Recovery, Edge::Rise));
+    let recovery_fs = limit(CheckKind::Recovery, Edge::Rise) as f64;
     assert_near(recovery_fs, 20_000.0 + late_fs);
     assert!(late_fs > 15_000.0, "the removal that is left is zero");
     assert_eq!(limit(CheckKind::Removal, Edge::Rise), 0);

@@ -4,8 +4,8 @@
 use crate::tool;
 
 use femtogate::liberty::{
-    CharacterisedNetlist, Clocking, Environment, Liberty, write_constraints, write_mapped,
-    write_mapped_cells, write_mapped_sdf,
+    CharacterisedNetlist, Clocking, Environment, Liberty, LibraryRemark, write_constraints,
+    write_mapped, write_mapped_cells, write_mapped_sdf,
 };
 use femtogate::netlist::{CellId, CellKind, ModuleBuilder, Netlist};
 use femtogate::units::Time;
@@ -123,12 +123,9 @@ fn odd_names_of_cells_and_pins_are_escaped() {
     let broken = text().replace("cell (INV_1)", "cell (\"INV\n1\")");
     let library = Liberty::read(&broken, &[]).unwrap();
     assert!(!library.map.cells(CellKind::Inv).concat().contains('\n'));
-    let told = library
-        .map
-        .odd
-        .iter()
-        .find(|told| told.contains("Verilog can have no name"));
-    assert!(told.is_some(), "{:?}", library.map.odd);
+    let told = |remark: &LibraryRemark| remark.to_string().contains("Verilog can have no name");
+    let remarks = &library.map.remarks;
+    assert!(remarks.iter().any(told), "{remarks:?}");
 }
 
 /// An output's own capacitance loads it beside its net, as in OpenSTA.
@@ -147,7 +144,7 @@ fn capacitance_of_outputs_is_a_load() {
         };
         let made = CharacterisedNetlist::new(&netlist, &library, &environment);
         let arc = made.timing.cell_delays(CellId::new(0))[0][0];
-        [arc.rise_fs, arc.fall_fs].map(f64::from)
+        [arc.rise(), arc.fall()].map(|delay| delay.as_fs() as f64)
     };
     let before = delays(&text());
     let with = "pin (Y) {\n    capacitance : 0.01;";

@@ -199,7 +199,9 @@ fn inertial_glitches(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> 
                     cell.kind.triggers(pin) && !is_fall(pin) && now[pin] != value(pin, time - 1)
                 });
                 let delays = causes.map(|pin| {
-                    i64::from(timing.cell_delays(CellId::new(index))[pin][which].delay_fs(next))
+                    timing.cell_delays(CellId::new(index))[pin][which]
+                        .delay(next)
+                        .as_fs()
                 });
                 let due = time + delays.min().unwrap();
                 on_their_way.retain(|&(arrives, _)| arrives > time);

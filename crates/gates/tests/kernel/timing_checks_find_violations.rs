@@ -134,7 +134,10 @@ fn every_check_is_exact_to_the_femtosecond() {
 /// One kind of check at its limit and a femtosecond beside it.
 fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str, Edge)) {
     let (library, netlist) = (Library::generic_40nm(), pair(kind));
-    let limit = i64::from(library.checks(kind).edge_limit_fs(check, varied.1, corner));
+    let limit = library
+        .checks(kind)
+        .edge_limit(check, varied.1, corner)
+        .as_fs();
     for slack in [1 - limit, -5_000, -1, 0, 1, 5_000] {
         let steps = script(kind, check, varied, limit + slack);
         let (report, ..) = simulate(&netlist, &library, corner, Policy::ReportOnly, &steps);
@@ -194,7 +197,7 @@ fn a_pulse_on_d_is_judged_at_both_its_edges() {
     let library = Library::generic_40nm();
     let limits = library.checks(CellKind::Dffr);
     let [rise, fall] =
-        Edge::BOTH.map(|e| i64::from(limits.edge_limit_fs(CheckKind::Setup, e, Corner::Typ)));
+        Edge::BOTH.map(|e| limits.edge_limit(CheckKind::Setup, e, Corner::Typ).as_fs());
     assert!(rise < fall);
     // The fall is within its limit, the later rise is not within its own.
     let steps = [
@@ -219,7 +222,7 @@ fn kinds(steps: &[(i64, &'static str, Logic)]) -> Vec<(CheckKind, i64)> {
 fn limit(check: CheckKind) -> i64 {
     let library = Library::generic_40nm();
     let limits = library.checks(CellKind::Dffr);
-    limits.edge_limit_fs(check, Edge::Rise, Corner::Typ).into()
+    limits.edge_limit(check, Edge::Rise, Corner::Typ).as_fs()
 }
 
 #[test]

@@ -65,7 +65,7 @@ fn reference(
     let mut found = Vec::new();
     let mut check =
         |which: CheckKind, name: &str, edge: Edge, completing: &[i64], since: &[i64]| {
-            let limit = i64::from(limits.edge_limit_fs(which, edge, Corner::Typ));
+            let limit = limits.edge_limit(which, edge, Corner::Typ).as_fs();
             for &time in completing.iter().filter(|t| !is_held(**t)) {
                 let Some(&from) = since.iter().rfind(|s| **s <= time) else {
                     continue;
@@ -110,7 +110,7 @@ fn reference(
 
 /// These limits for every flip-flop: setup and hold of a rising and a falling D, recovery, removal, high and low clock,
 /// high control.
-fn limits(fs: [u32; 9]) -> CheckLimits {
+fn limits(fs: [i64; 9]) -> CheckLimits {
     let [
         setup,
         setup_fall,
@@ -121,7 +121,7 @@ fn limits(fs: [u32; 9]) -> CheckLimits {
         clock_high,
         clock_low,
         control_high,
-    ] = fs.map(Delay::fixed);
+    ] = fs.map(|fs| Delay::fixed(Time::from_fs(fs)));
     let setup = DataLimit {
         rise: setup,
         fall: setup_fall,
@@ -219,7 +219,7 @@ fn random_netlists_give_the_violations_of_the_definitions() {
     let cases = prop_oneof![circuit::flat(), circuit::hierarchical()];
     let strategy = (
         cases,
-        prop::array::uniform9(1_000u32..300_000),
+        prop::array::uniform9(1_000i64..300_000),
         any::<bool>(),
     );
     TestRunner::new(config)
@@ -252,8 +252,8 @@ proptest! {
     #[test]
     fn random_stimuli_give_the_violations_of_the_definitions(
         steps in prop::collection::vec((0i64..150, 0usize..4, 0usize..4), 1..120),
-        limits in prop::array::uniform9(0u32..8),
-        delays in prop::array::uniform2(1u32..5),
+        limits in prop::array::uniform9(0i64..8),
+        delays in prop::array::uniform2(1i64..5),
         has_set: bool,
         spreads_x: bool,
     ) {
@@ -262,7 +262,10 @@ proptest! {
         let mut library = Library::generic_40nm();
         let limits = self::limits(limits);
         library.set_checks(kind, limits);
-        let arc = |fs| [TimingArc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) }; 2];
+        let arc = |fs| {
+            let delay = Delay::fixed(Time::from_fs(fs));
+            [TimingArc { rise: delay, fall: delay }; 2]
+        };
         library.set_arcs(kind, [arc(0), arc(delays[0]), arc(delays[1]), arc(delays[1])]);
         let netlist = pair(kind);
         let pins = kind.inputs();

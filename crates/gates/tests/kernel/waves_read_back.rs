@@ -131,10 +131,11 @@ fn drives(netlist: &Netlist, choices: &[(usize, u8, i64)]) -> Vec<Drive> {
 fn coarse_library() -> Library {
     let mut library = Library::generic_40nm();
     for kind in CellKind::ALL {
-        let fs = if kind.is_flip_flop() { 1_000 } else { 0 };
+        let ps = i64::from(kind.is_flip_flop());
+        let delay = Delay::fixed(Time::from_ps(ps));
         let arc = TimingArc {
-            rise: Delay::fixed(fs),
-            fall: Delay::fixed(fs),
+            rise: delay,
+            fall: delay,
         };
         library.set_arcs(kind, [[arc; 2]; 4]);
     }

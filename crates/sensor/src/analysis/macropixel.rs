@@ -119,7 +119,7 @@ impl MacropixelTiming {
         let (hits, clk_rest) = circuit.split(clk.all(), !is_library);
         let limit = |kind: CheckKind| {
             let limits = library.checks(CellKind::Dffr);
-            Time::from_fs(limits.limit_fs(kind, corner).into())
+            limits.limit(kind, corner)
         };
         let whole = "the macropixel connects these";
         MacropixelTiming {
@@ -137,7 +137,7 @@ impl MacropixelTiming {
             counter_clk_high: circuit
                 .clocked_by_counter_clk()
                 .map(|cell| library.checks(netlist.cells()[cell.index()].kind))
-                .map(|checks| Time::from_fs(checks.limit_fs(CheckKind::ClockHigh, corner).into()))
+                .map(|checks| checks.limit(CheckKind::ClockHigh, corner))
                 .max()
                 .expect("a P-counter counts"),
             reset: delays.reset,

@@ -76,9 +76,9 @@ impl ReadTiming {
         let set_up = stages.flat_map(|cell| {
             let limits = library.checks(cell.kind);
             Edge::BOTH.map(|edge| {
-                let setup = limits.edge_limit_fs(CheckKind::Setup, edge, silicon.corner);
+                let setup = limits.edge_limit(CheckKind::Setup, edge, silicon.corner);
                 let window = from_words.edge_window(cell.input(0), edge);
-                window.map(|(_, last)| last + Time::from_fs(setup.into()))
+                window.map(|(_, last)| last + setup)
             })
         });
         let set_up = set_up.flatten().max().expect("words are taken");

@@ -361,7 +361,7 @@ impl SensorConfig {
     /// The elements of its delay lines.
     pub(super) fn delay_elements(&self) -> Elements {
         Elements {
-            mean_fs: self.delay_element().as_fs() as u32,
+            mean: self.delay_element(),
             sigma: self.delay_sigma,
             seed: self.delay_seed.into(),
         }

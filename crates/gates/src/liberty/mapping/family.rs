@@ -11,8 +11,9 @@
 //! chosen to keep. That is eight of the smallest inverter's kind on the smallest inverter. A larger cell is a drive of its own only if it
 //! is stronger. So cells that delay on purpose are none.
 
-use super::super::cell::{Candidate, CellModel, Role};
-use super::super::error::LibertyError;
+use super::super::candidate::{Candidate, Role};
+use super::super::cell::CellModel;
+use super::super::error::{LibertyError, PassedOver, PassedOverReason};
 use super::{Maker, Source, Stage, gate_function, order};
 use crate::liberty::function::TruthTable;
 use crate::netlist::CellKind;
@@ -23,8 +24,8 @@ impl Maker<'_, '_> {
         let known = self.read_model(candidate);
         match known {
             Ok(model) => Some(model),
-            Err(fault) => {
-                self.pass_over(candidate, &fault);
+            Err(error) => {
+                self.pass_over(candidate, error);
                 None
             }
         }
@@ -46,13 +47,14 @@ impl Maker<'_, '_> {
             .clone()
     }
 
-    /// Tells the user why a cell is not used.
-    pub(super) fn pass_over(&self, candidate: &Candidate<'_, '_>, fault: &LibertyError) {
-        let place = self.files[candidate.file].place(fault.line);
-        let sentence = format!("{place}: {} is not used: {fault}", candidate.name());
+    /// Keeps for the user why a cell is not used.
+    pub(super) fn pass_over(&self, candidate: &Candidate<'_, '_>, error: LibertyError) {
+        let file = &self.files[candidate.file];
+        let why = PassedOverReason::Faulty(Box::new(error));
+        let cell = PassedOver::new(file, candidate.group, why);
         let mut passed_over = self.passed_over.borrow_mut();
-        if !passed_over.contains(&sentence) {
-            passed_over.push(sentence);
+        if !passed_over.contains(&cell) {
+            passed_over.push(cell);
         }
     }
 

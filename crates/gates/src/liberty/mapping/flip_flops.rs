@@ -10,9 +10,10 @@
 //! A flip-flop may stand for one of the inverse state, with clear and preset exchanged. Our reset wins over the set; so a cell whose
 //! preset wins stands for the inverse state.
 
-use super::super::cell::{Candidate, FlipFlop, Role};
+use super::super::candidate::{Candidate, FlipFlop, Role};
 use super::super::complete::check_flip_flop;
 use super::super::error::LibertyError;
+use super::super::remark::LibraryRemark;
 use super::family::drives;
 use super::{Maker, Notes, Recipe, Source, Stage};
 use crate::netlist::CellKind;
@@ -56,9 +57,8 @@ impl<'g, 't> Maker<'g, 't> {
         });
         let complete = |cell: &Candidate<'_, '_>, roles: &FlipFlop| {
             let model = self.model(cell)?;
-            if let Err(message) = check_flip_flop(&model, roles, with_set) {
-                let line = cell.group.line;
-                self.pass_over(cell, &LibertyError { line, message });
+            if let Err(fault) = check_flip_flop(&model, roles, with_set) {
+                self.pass_over(cell, LibertyError::new(cell.group.line, fault));
                 return None;
             }
             Some(model)
@@ -125,27 +125,27 @@ impl<'g, 't> Maker<'g, 't> {
         roles: &FlipFlop,
         notes: &mut Notes,
     ) {
-        let (name, kind_name) = (chosen.name(), kind.name());
+        let cell = || chosen.name().to_owned();
         if kind == CellKind::Dffsr && roles.preset_wins().is_none() {
-            notes.odd.push(format!(
-                "the library leaves open what {name} does while clear and preset are both active (clear_preset_var1); the clear is taken to win"
-            ));
+            notes
+                .remarks
+                .push(LibraryRemark::OpenState { cell: cell() });
         }
         let tied = chosen.inputs.iter().enumerate();
         let tied = tied.filter(|(pin, _)| roles.tied >> pin & 1 == 1);
-        let tied = tied.map(|(pin, input)| format!("{input} = {}", roles.tied_levels >> pin & 1));
-        let tied: Vec<String> = tied.collect();
-        let missing = "the library has no other that would do";
-        if !tied.is_empty() {
-            notes.odd.push(format!(
-                "{kind_name} is made of {name} with pins tied ({}): {missing}",
-                tied.join(", ")
-            ));
+        let level = |pin: usize| roles.tied_levels >> pin & 1 == 1;
+        let pins: Vec<_> = tied
+            .map(|(pin, &input)| (input.to_owned(), level(pin)))
+            .collect();
+        if !pins.is_empty() {
+            let cell = cell();
+            notes
+                .remarks
+                .push(LibraryRemark::TiedPins { kind, cell, pins });
         }
         if chosen.dont_use {
-            notes.odd.push(format!(
-                "{kind_name} is made of {name}, which the library says not to use: {missing}"
-            ));
+            let cell = cell();
+            notes.remarks.push(LibraryRemark::DontUse { kind, cell });
         }
     }
 }

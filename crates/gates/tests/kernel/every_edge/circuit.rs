@@ -195,11 +195,11 @@ impl Case {
     /// Random delays of every arc in every corner.
     pub fn cell_library(&self) -> Library {
         let mut random = StdRng::seed_from_u64(self.delay_seed);
-        let mut fs = || self.on_grid(random.random_range(DELAYS_FS));
+        let mut time = || Time::from_fs(self.on_grid(random.random_range(DELAYS_FS)).into());
         let mut delay = || Delay {
-            min_fs: fs(),
-            typ_fs: fs(),
-            max_fs: fs(),
+            min: time(),
+            typ: time(),
+            max: time(),
         };
         let mut library = Library::generic_40nm();
         for kind in CellKind::ALL {

@@ -24,6 +24,7 @@ use super::readout::ReadoutOrder;
 use super::{finished, load_path, macropixel, readout};
 use crate::chip::config::SensorConfig;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net, OwnDelay};
+use crate::units::Time;
 
 /// The name of the top.
 pub const NAME: &str = "quantic4x4";
@@ -44,8 +45,8 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
 
 /// What brings CLK later to a column than to the first, and STOP and RUN alike.
 fn wire_to(config: &SensorConfig, col: usize) -> Option<OwnDelay> {
-    let typical_fs = config.clk_wire(col).as_fs() as u32;
-    (typical_fs > 0).then(|| OwnDelay::wire(typical_fs))
+    let typical = config.clk_wire(col);
+    (typical > Time::ZERO).then(|| OwnDelay::wire(typical))
 }
 
 /// The wire that brings CLK to a column, by itself: CLK → CLK_C; none where it comes as to the first.

@@ -23,6 +23,7 @@ use std::sync::Arc;
 
 use super::{finished, metdc};
 use crate::netlist::{CellKind, DelayModel, Mismatch, Module, ModuleBuilder, Net, OwnDelay};
+use crate::units::Time;
 
 /// Buffers from SAMPLE_CLK to STROBE: clk-to-Q, XOR, mux and setup take 0.2 ns in the typical corner, four buffers 0.18 ns.
 const STROBE_BUFFERS: usize = 6;
@@ -30,8 +31,8 @@ const STROBE_BUFFERS: usize = 6;
 /// What the elements of a sensor's delay lines are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Elements {
-    /// Delay of an element on average, in the typical corner, fs.
-    pub mean_fs: u32,
+    /// Delay of an element on average, in the typical corner.
+    pub mean: Time,
     /// Standard deviation of an element's delay, relative to the mean.
     pub sigma: f64,
     /// Which chip.
@@ -41,7 +42,7 @@ pub struct Elements {
 impl Elements {
     fn delay(&self) -> OwnDelay {
         OwnDelay {
-            typical_fs: self.mean_fs,
+            typical: self.mean,
             spread: Some(Mismatch {
                 sigma: self.sigma,
                 seed: self.seed,

@@ -24,8 +24,8 @@ use super::{finished, front_end};
 use crate::netlist::{CellKind, Module, ModuleBuilder, OwnDelay};
 use crate::units::Time;
 
-/// Delay of an XOR or the driver in the typical corner, fs: between those of the library's XOR to either side.
-const STAGE_FS: u32 = 57_553;
+/// Delay of an XOR or the driver in the typical corner: between those of the library's XOR to either side.
+const STAGE: Time = Time::from_fs(57_553);
 
 /// The photon line of `spads` SPADs, a power of two.
 ///
@@ -45,7 +45,7 @@ pub fn circuit(spads: usize) -> Arc<Module> {
         ];
         m.instance_by_names(&format!("spad_{spad}"), &toggle, &ports);
     }
-    let stage = OwnDelay::balanced(STAGE_FS);
+    let stage = OwnDelay::balanced(STAGE);
     while level.len() > 1 {
         let joined = m.wire_bus(&format!("OF_{}", 2 * spads / level.len()), level.len() / 2);
         for (pair, (inputs, &output)) in level.chunks(2).zip(&joined).enumerate() {

@@ -19,7 +19,7 @@ use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::files::instead_of;
 use crate::liberty::{CharacterisedNetlist, Environment, Liberty};
-use crate::netlist::{CellKind, Corner, Library, Module, Netlist, ScopeId, Timing};
+use crate::netlist::{ArcDelay, CellKind, Corner, Library, Module, Netlist, ScopeId, Timing};
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +30,8 @@ pub struct CellLibrary(Option<&'static FromFile>);
 pub struct FromFile {
     /// Its cells.
     pub liberty: Liberty,
+    /// What is odd about them, one sentence each.
+    pub remarks: Vec<String>,
     /// Slews and wires that they are timed with.
     pub environment: Environment,
     /// Delays and limits of each kind by itself.
@@ -98,8 +100,8 @@ impl CellLibrary {
             .zip(&texts)
             .map(|(name, text)| (&**name, &**text))
             .collect();
-        let mut liberty = Liberty::read_files(&named, &cells).map_err(|e| {
-            let place = format!("{}:{}", files[e.file].display(), e.fault.line);
+        let liberty = Liberty::read_files(&named, &cells).map_err(|e| {
+            let place = format!("{}:{}", files[e.file].display(), e.error.line);
             (key, format!("{place}: {e}"))
         })?;
         let mut environment = Environment::new(&liberty);
@@ -120,9 +122,11 @@ impl CellLibrary {
             );
             return Err((key, format!("{}: {message}", path.display())));
         }
+        let remarks = liberty.map.remarks.iter();
+        let mut remarks: Vec<String> = remarks.map(ToString::to_string).collect();
         if shortest_fs < 0.0 {
             let ps = shortest_fs * 1e-3;
-            liberty.map.odd.push(format!(
+            remarks.push(format!(
                 "delays below zero count as 0: the least in a macropixel is {ps:.3} ps, of {of_shortest}"
             ));
         }
@@ -134,6 +138,7 @@ impl CellLibrary {
         // As long as the process: a sensor's copies share it, and a process has few libraries.
         let from_file: &'static FromFile = Box::leak(Box::new(FromFile {
             liberty,
+            remarks,
             environment,
             nominal,
         }));
@@ -176,8 +181,8 @@ impl FromFile {
             let cell = cells.nth(toggle).expect("a cell of the module");
             let mut delays = *timing.cell_delays(cell);
             for arc in delays.as_flattened_mut() {
-                let slower = arc.rise_fs.max(arc.fall_fs);
-                (arc.rise_fs, arc.fall_fs) = (slower, slower);
+                let slower = arc.rise().max(arc.fall());
+                *arc = ArcDelay::new(slower, slower);
             }
             timing.set(cell, delays);
         }

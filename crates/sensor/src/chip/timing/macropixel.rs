@@ -22,7 +22,6 @@ use std::sync::OnceLock;
 use super::cell_library::CellLibrary;
 use super::silicon::Silicon;
 use crate::chip::{LoadProbe, Probe, Probes, SensorConfig, Tdc, array};
-use crate::logic::Logic::{One, Zero};
 use crate::netlist::{
     Arrivals, CellId, CellKind, Corner, Edge, FlatCell, NetId, Netlist, Requirement, ScopeId,
     StaticTiming, Timing,
@@ -366,8 +365,7 @@ impl<'c> MacropixelPaths<'c> {
     /// Clock → an output rises, falls, of one flip-flop.
     fn clock_to_q(&self, cell: CellId, output: usize) -> (Time, Time) {
         let clock = self.timing.cell_delays(cell)[1][output];
-        let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.delay_fs(to).into()));
-        (rise, fall)
+        (clock.rise(), clock.fall())
     }
 
     /// SPAD_RAW rises → what CLK samples, of each SPAD.
@@ -435,9 +433,8 @@ impl<'c> MacropixelPaths<'c> {
                 let pins = 0..leaf.kind.inputs().len();
                 let arcs = pins.filter(|&pin| leaf.kind.triggers(pin)).flat_map(|pin| {
                     let arcs = &self.timing.cell_delays(cell)[pin][..leaf.kind.outputs().len()];
-                    arcs.iter().flat_map(|arc| [arc.rise_fs, arc.fall_fs])
+                    arcs.iter().flat_map(|arc| [arc.rise(), arc.fall()])
                 });
-                let arcs = arcs.map(|fs| Time::from_fs(fs.into()));
                 arcs.map(|delay| (delay, delay)).reduce(hull)
             })
     }

@@ -67,8 +67,7 @@ impl ResetPulse {
         (delays, counter): (&MacropixelDelays, &CounterDelays),
         (library, corner): (&Library, Corner),
     ) -> Self {
-        let limit_of =
-            |kind, check| Time::from_fs(library.checks(kind).limit_fs(check, corner).into());
+        let limit_of = |kind, check| library.checks(kind).limit(check, corner);
         let limit = |check| {
             let limits = circuit.counting_kinds().map(|kind| limit_of(kind, check));
             limits.max().expect("a P-counter counts")
@@ -129,10 +128,7 @@ impl MeasuredDelays {
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
         let clk = Requirements::behind(&circuit.netlist, clk, &library, silicon.corner);
         let (_, clk) = circuit.split(clk.all(), false);
-        let limit_of = |kind, check| {
-            let limit = library.checks(kind).limit_fs(check, silicon.corner);
-            Time::from_fs(limit.into())
-        };
+        let limit_of = |kind, check| library.checks(kind).limit(check, silicon.corner);
         // SPADs, SHIFT and HIT have flip-flops of this kind.
         let limit = |check| limit_of(CellKind::Dffr, check);
         let counting = circuit.clocked_by_counter_clk();

@@ -398,7 +398,7 @@ fn fastest_cell_fs(survey: &Survey) -> i64 {
         })
     });
     delays
-        .map(|arc| i64::from(arc.rise_fs.min(arc.fall_fs)))
+        .map(|arc| arc.rise().min(arc.fall()).as_fs())
         .min()
         .unwrap_or(0)
 }

@@ -1,5 +1,6 @@
 //! Which flip-flop is taken, what is put around it, and what it does while set and reset are both active.
 
+use super::sentences::sentences;
 use super::*;
 
 #[test]
@@ -111,13 +112,13 @@ fn a_scan_flip_flop_is_taken_where_there_is_no_other() {
         let inputs = [1, 0, 2, 3].map(Source::Input);
         let sources = [&inputs[..], &[tied, tied]].concat();
         assert_eq!(found.recipe(CellKind::Dffsr).stages[0].sources, sources);
-        let told = |says: &str| found.odd.iter().any(|sentence| sentence.contains(says));
+        let remarks = sentences(&found);
+        let told = |says: &str| remarks.iter().any(|sentence| sentence.contains(says));
         assert!(
             told("SDRS_1 with pins tied (SE = 0, SI = 0)"),
-            "{:?}",
-            found.odd
+            "{remarks:?}"
         );
-        assert_eq!(told("says not to use"), says_not_to_use, "{:?}", found.odd);
+        assert_eq!(told("says not to use"), says_not_to_use, "{remarks:?}");
     }
     // A plain one is preferred, even if it is larger.
     let both = scan
@@ -149,9 +150,6 @@ fn a_scan_flip_flop_is_taken_where_there_is_no_other() {
     );
     let found = map(&(gates + &inverse), &[]).unwrap();
     assert_eq!(found.cells(CellKind::Dffsr), ["DQN_1", "INV_1"]);
-    assert!(
-        !found.notes.iter().any(|note| note.contains("both active")),
-        "{:?}",
-        found.notes
-    );
+    let is_open = |remark: &LibraryRemark| matches!(remark, LibraryRemark::OpenState { .. });
+    assert!(!found.remarks.iter().any(is_open), "{:?}", found.remarks);
 }

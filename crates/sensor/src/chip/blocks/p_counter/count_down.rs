@@ -103,13 +103,12 @@ impl<'n> CountDown<'n> {
     ) -> Self {
         let slowest = |cell: CellId| {
             let arcs = timing.cell_delays(cell).as_flattened().iter();
-            arcs.map(|arc| arc.rise_fs.max(arc.fall_fs))
-                .max()
-                .unwrap_or(0)
+            let slowest = arcs.map(|arc| arc.rise().max(arc.fall())).max();
+            slowest.unwrap_or_default()
         };
         let all: i64 = netlist
             .cells_below(ScopeId::TOP)
-            .map(|cell| i64::from(slowest(cell)))
+            .map(|cell| slowest(cell).as_fs())
             .sum();
         CountDown {
             kernel: LaneKernel::new(netlist, timing),

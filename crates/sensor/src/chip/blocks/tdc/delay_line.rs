@@ -14,7 +14,6 @@ use std::sync::Arc;
 
 use super::Steps;
 use crate::chip::blocks::finished;
-use crate::logic::Logic;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Netlist, Timing};
 use crate::units::Time;
 
@@ -59,7 +58,7 @@ pub fn model(netlist: &Netlist, timing: &Timing, path: &str) -> Steps {
     };
     let elements = (0..).map_while(element);
     let edges = elements.scan(Time::ZERO, |passed, cell| {
-        *passed += Time::from_fs(timing.cell_delays(cell)[0][0].delay_fs(Logic::One).into());
+        *passed += timing.cell_delays(cell)[0][0].rise();
         Some(*passed)
     });
     let steps = Steps::new(edges.collect());

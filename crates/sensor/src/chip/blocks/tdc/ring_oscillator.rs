@@ -76,7 +76,7 @@ impl RingOscillatorModel {
         };
         let delay = |name: &str, pin: usize, to| {
             let cell = cell(name).expect("a ring has its cells");
-            Time::from_fs(timing.cell_delays(cell)[pin][0].delay_fs(to).into())
+            timing.cell_delays(cell)[pin][0].delay(to)
         };
         let inverters = (1..).map(|stage| format!("ring_{stage}"));
         let inverters = inverters.take_while(|name| cell(name).is_some());

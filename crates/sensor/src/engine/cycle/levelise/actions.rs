@@ -108,21 +108,19 @@ impl Leveliser<'_> {
         // Where the flip-flop's clock comes is told by the delay with which it was given its place.
         let to_output = self.longest_delay(index, CLOCK);
         let of_register = &survey.timing.cell_delays(CellId::new(register))[CLOCK][output];
-        let (rise, fall) = (
-            i64::from(of_register.rise_fs),
-            i64::from(of_register.fall_fs),
-        );
+        let (rise, fall) = (of_register.rise().as_fs(), of_register.fall().as_fs());
         let due = (cause.position_fs + arrival_fs).rem_euclid(self.period_fs);
         let after_change = due - to_output - self.period_fs / 2 - rise.max(fall);
         let edges = after_change.div_euclid(self.period_fs);
         let after = after_change.rem_euclid(self.period_fs);
         let limits = self.cell_library.checks(cell.kind);
         let limit = |limit: DataLimit| {
+            let corner = self.config.corner;
             let longest = limit
                 .rise
-                .in_corner_fs(self.config.corner)
-                .max(limit.fall.in_corner_fs(self.config.corner));
-            i64::from(longest) + ROUNDING_FS
+                .in_corner(corner)
+                .max(limit.fall.in_corner(corner));
+            longest.as_fs() + ROUNDING_FS
         };
         let before = self.period_fs - after - (rise - fall).abs();
         let is_race = after <= limit(limits.setup) || before <= limit(limits.hold);

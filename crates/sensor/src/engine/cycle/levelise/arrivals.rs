@@ -69,10 +69,8 @@ impl Leveliser<'_> {
         let outputs = self.survey.netlist.cells()[arc.cell].outputs;
         let output = outputs.iter().position(|&net| net == Some(to.0));
         let output = output.expect("an arc leads to an output");
-        i64::from(
-            self.survey.timing.cell_delays(CellId::new(arc.cell))[arc.pin][output]
-                .delay_fs(to.1.level()),
-        )
+        let delays = self.survey.timing.cell_delays(CellId::new(arc.cell));
+        delays[arc.pin][output].delay(to.1.level()).as_fs()
     }
 
     /// The longest delay to any output: a draft of a flip-flop stands for what both of them do.
@@ -83,8 +81,8 @@ impl Leveliser<'_> {
             .iter()
             .zip(leaf.outputs)
             .filter(|(_, net)| net.is_some());
-        let longest = connected.map(|(arc, _)| arc.rise_fs.max(arc.fall_fs)).max();
-        longest.unwrap_or_default().into()
+        let longest = connected.map(|(arc, _)| arc.rise().max(arc.fall())).max();
+        longest.unwrap_or_default().as_fs()
     }
 
     /// The changes that a cause brings while these flip-flops are held.

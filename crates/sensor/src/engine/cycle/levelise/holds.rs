@@ -99,8 +99,7 @@ impl Leveliser<'_> {
                 let edge = (cells[cell].input(CLOCK), Edge::Rise);
                 let removal = self.cell_library.checks(cells[cell].kind).removal;
                 reach.arrival.get(&edge).is_none_or(|&(_, late)| {
-                    late + i64::from(removal.in_corner_fs(self.config.corner))
-                        < self.hold_fs(cause, cell)
+                    late + removal.in_corner(self.config.corner).as_fs() < self.hold_fs(cause, cell)
                 })
             });
             let mut released = reach.held.difference(&held);
