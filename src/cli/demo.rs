@@ -9,11 +9,14 @@ use serde::Serialize;
 use super::voice::{announce, notes, progress, say_unless_quiet};
 use crate::demo::disturbed::{Disturbance, DisturbanceOutcome};
 use crate::demo::show::{Show, ShowResult};
-use crate::demo::{Demonstrator, limit, shows, sweep};
+use crate::demo::{Demonstrator, LASER_CYCLES, limit, shows, sweep};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::{BehaviouralStereo, Guide, options};
 use crate::report::{Grid, write_ply};
 use crate::units::Time;
+
+/// Most laser cycles of an exposure: more than a second of 80 kHz.
+const MOST_LASER_CYCLES: i64 = 100_000;
 
 /// The experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
@@ -54,6 +57,15 @@ impl Demo {
             Demo::Interference => 1700.0,
         }
     }
+
+    /// Laser cycles of an exposure, unless others are asked for.
+    fn laser_cycles(self) -> u32 {
+        if self == Demo::Night {
+            shows::NIGHT_LASER_CYCLES
+        } else {
+            LASER_CYCLES
+        }
+    }
 }
 
 /// Arguments of `gdtof demo`.
@@ -74,6 +86,9 @@ pub(super) struct DemoArgs {
     /// Step of the laser that calibrates the chip's delay lines before the demo, ps.
     #[arg(long, value_name = "PS", default_value_t = 40.0)]
     calibration_step_ps: f64,
+    /// Laser cycles of each exposure: few for a quick look [default: 16000, and 2000 in night].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_LASER_CYCLES))]
+    laser_cycles: Option<u32>,
 }
 
 /// The request, for the manifest.
@@ -83,6 +98,8 @@ struct Configuration {
     guide: Vec<String>,
     seed: u64,
     calibration_step_ps: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    laser_cycles: Option<u32>,
 }
 
 /// Runs the command.
@@ -93,6 +110,10 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     if !(1.0..=200.0).contains(&args.calibration_step_ps) {
         let message = format!("{} is impossible; give 1 to 200", args.calibration_step_ps);
         return Err(InputError::new("--calibration-step-ps", message).into());
+    }
+    if args.demo == Demo::Limit && args.laser_cycles.is_some() {
+        let message = "is no part of limit, which finds how many fit into a frame; leave it out";
+        return Err(InputError::new("--laser-cycles", message).into());
     }
     let guide = if args.guide.is_empty() {
         None
@@ -109,7 +130,11 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         .clone()
         .unwrap_or_else(|| PathBuf::from(format!("demo_{}", name.get_name())));
     let results = ResultSet::begin(&out, "demo")?;
-    let seconds = args.demo.processor_s() / rayon::current_num_threads() as f64;
+    let usual = f64::from(args.demo.laser_cycles());
+    let share = args
+        .laser_cycles
+        .map_or(1.0, |cycles| f64::from(cycles) / usual);
+    let seconds = args.demo.processor_s() * share / rayon::current_num_threads() as f64;
     announce(name.get_name(), seconds);
     let began = Instant::now();
     let bar = |what: &str, length: u64| {
@@ -119,7 +144,10 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     let calibrated = || -> anyhow::Result<Demonstrator> {
         let progress = bar("calibrating", 2048);
         let step = Time::from_s(args.calibration_step_ps * 1e-12);
-        let demonstrator = Demonstrator::calibrated(step, || progress.inc(1))?;
+        let mut demonstrator = Demonstrator::calibrated(step, || progress.inc(1))?;
+        if let Some(cycles) = args.laser_cycles {
+            demonstrator.exposure.laser_cycles = cycles;
+        }
         progress.finish_and_clear();
         Ok(demonstrator)
     };
@@ -142,7 +170,8 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
             let progress = bar("drawing", draws);
             let outcomes = disturbance.outcomes(&demonstrator, args.seed, || progress.inc(1))?;
             progress.finish_and_clear();
-            write_disturbed(results.staging(), disturbance.name, &outcomes)?
+            let cycles = demonstrator.exposure.laser_cycles;
+            write_disturbed(results.staging(), disturbance.name, cycles, &outcomes)?
         }
         Demo::Sweep => {
             let demonstrator = calibrated()?;
@@ -166,6 +195,11 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
                 _ => unreachable!("they have no shows"),
             };
             let mut shows = shows(&demonstrator, args.seed);
+            if let Some(cycles) = args.laser_cycles {
+                for show in &mut shows {
+                    show.settings.frame.exposure.laser_cycles = cycles;
+                }
+            }
             if let Some(guide) = &guide {
                 // Those that show what another guide makes of it keep theirs.
                 let of_stereo =
@@ -190,6 +224,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         guide: args.guide.clone(),
         seed: args.seed,
         calibration_step_ps: args.calibration_step_ps,
+        laser_cycles: args.laser_cycles,
     };
     let names = file_names(results.staging())?;
     notes(results.commit(&configuration)?);
@@ -277,6 +312,7 @@ fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String
 fn write_disturbed(
     folder: &Path,
     name: &str,
+    laser_cycles: u32,
     outcomes: &[DisturbanceOutcome],
 ) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(outcomes)?;
@@ -300,7 +336,7 @@ fn write_disturbed(
         ]);
     }
     Ok(format!(
-        "HSLIDAR, 16 000 laser cycles for each scheme, 30 klux: shares of macropixels on targets, with 95 % intervals, and the mean error of depths that are right to a bin\n{grid}"
+        "HSLIDAR, {laser_cycles} laser cycles for each scheme, 30 klux: shares of macropixels on targets, with 95 % intervals, and the mean error of depths that are right to a bin\n{grid}"
     ))
 }
 

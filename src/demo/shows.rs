@@ -168,7 +168,7 @@ pub(crate) fn night(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
         unguided: Unguided::Sweep,
         ..WindowPolicy::for_sequences()
     };
-    show.settings.frame.exposure.laser_cycles = 2_000;
+    show.settings.frame.exposure.laser_cycles = NIGHT_LASER_CYCLES;
     // The pedestrian moves by 3 cm meanwhile, a fourth of a macropixel and a ninth of the pulse's standard deviation.
     show.settings.segments = 1;
     // What a prediction takes is next to nothing.
@@ -200,6 +200,9 @@ fn target_show(
         compares: false,
     }
 }
+
+/// Laser cycles of an exposure at night: 25 ms, between which windows step.
+pub(crate) const NIGHT_LASER_CYCLES: u32 = 2_000;
 
 /// Frames of Fig. 99 and 100 together.
 const FRAMES: u32 = 4;

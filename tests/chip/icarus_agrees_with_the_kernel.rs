@@ -1,6 +1,7 @@
 //! The exported macropixel in Icarus Verilog, on random stimuli: the same LOCAL_STOP times to the
 //! femtosecond and the same histogram counts as our kernel. Skipped, loudly, where Icarus is absent.
 
+use crate::cases;
 use crate::icarus;
 use crate::scenario;
 
@@ -38,7 +39,7 @@ fn compare(random: &mut StdRng, rows: usize, cols: usize) {
 #[test]
 fn single_macropixels() {
     if icarus::is_here() {
-        for seed in 0..40 {
+        for seed in 0..cases::cases(16).into() {
             compare(&mut StdRng::seed_from_u64(seed), 1, 1);
         }
     }

@@ -21,7 +21,11 @@ pub const RUNS: &[(&str, &str, bool)] = &[
         false,
     ),
     ("photons", "--rows 2 --cols 2 --laser-cycles 2", false),
-    ("demo", "glass --calibration-step-ps 200", false),
+    (
+        "demo",
+        "glass --calibration-step-ps 200 --laser-cycles 100",
+        false,
+    ),
     (
         "replay",
         "--rows 1 --cols 2 --inits inits.csv --events events.csv --stop-periods 100 --laser-cycles 5",

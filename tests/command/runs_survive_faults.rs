@@ -24,7 +24,10 @@ const RUNS: [(&str, &str); 5] = [
         "drive",
         "drive --rows 4 --cols 6 --frames 2 --laser-cycles 40 --set scene.light.illuminance_klux=0 --set scene.lidar.pulse_energy_uj=0.1",
     ),
-    ("demo", "demo glass --calibration-step-ps 200"),
+    (
+        "demo",
+        "demo glass --calibration-step-ps 200 --laser-cycles 100",
+    ),
     ("sweep", "sweep study"),
     ("page", "page frame"),
 ];

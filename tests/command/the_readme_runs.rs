@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release --` stands for the program that was built with the tests. What installs something or opens a window is left out;
 //! the test prints these lines. `python/tests/test_readme.py` runs the blocks of Python, and the book's tests its chapters.
+//!
+//! What takes half a minute is shortened; the test prints how. With `GDTOF_CASES=1` nothing is.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,6 +15,19 @@ const LEFT_OUT: [(&str, &str); 5] = [
     ("pip install ", "it installs the Python package"),
     ("gtkwave ", "it opens a window"),
     ("surfer ", "it opens a window"),
+];
+
+/// What is short for what takes long: fewer frames, points and designs.
+const SHORTENED: [(&str, &str); 3] = [
+    ("--frames 30", "--frames 2"),
+    (
+        "laser_and_sunlight.toml",
+        "laser_and_sunlight.toml --shard 1/36",
+    ),
+    (
+        "--klux 1 --fps 50",
+        "--klux 1 --fps 50 --bins 16 --clk 384 --thresholds 0 --guide-sigma 0.3",
+    ),
 ];
 
 /// What README says that a frame leaves in `out`, and what its viewers open there.
@@ -56,6 +71,18 @@ fn runnable(line: &str) -> Option<String> {
     (!is_left_out).then(|| line.replace("cargo run --release -- ", "gdtof "))
 }
 
+/// A line that takes little time, unless all is asked for.
+fn shortened(mut line: String) -> String {
+    let is_whole = std::env::var("GDTOF_CASES").is_ok();
+    for (long, short) in SHORTENED {
+        if !is_whole && line.contains(long) {
+            line = line.replace(long, short);
+            eprintln!("SHORTENED: {line}");
+        }
+    }
+    line
+}
+
 /// Runs a line and returns what it prints.
 fn run(folder: &Path, line: &str) -> String {
     let program = Path::new(env!("CARGO_BIN_EXE_gdtof"));
@@ -84,7 +111,7 @@ fn from_top_to_bottom_in_an_empty_folder() {
     let mut printed = Vec::new();
     for line in &lines {
         match runnable(line) {
-            Some(command) => printed.push(run(here, &command)),
+            Some(command) => printed.push(run(here, &shortened(command))),
             None => eprintln!("LEFT OUT: {line}"),
         }
     }
@@ -118,6 +145,10 @@ fn what_is_left_out_stands_in_the_readme() {
     for (begin, why) in LEFT_OUT {
         let stands = lines.iter().any(|line| line.starts_with(begin));
         assert!(stands, "{begin} ({why}) is in no line of README");
+    }
+    for (long, _) in SHORTENED {
+        let stands = lines.iter().any(|line| line.contains(long));
+        assert!(stands, "{long} is in no line of README");
     }
     let runs = lines.iter().filter_map(|line| runnable(line));
     for line in runs {

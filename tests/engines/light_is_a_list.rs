@@ -145,7 +145,7 @@ fn with_more(case: Case, more: &More) -> Case {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 120, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(crate::cases::cases(60)))]
 
     #[test]
     fn the_window_engine_counts_what_the_full_stream_shows(
@@ -456,7 +456,7 @@ fn cohorts_follow_echoes_profiles_and_timelines() {
             name,
             light,
             start,
-            seeds: comparison::seeds() / 4,
+            seeds: comparison::seeds() / 8,
             ..comparison::case()
         }
         .agrees();
