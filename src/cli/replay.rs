@@ -1,6 +1,7 @@
 //! `gdtof replay`: recorded SPAD events in, histograms out.
 
 mod histograms;
+mod nothing_counted;
 mod stimuli;
 
 use std::path::PathBuf;
@@ -160,6 +161,9 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         time_keeping: replayed.coverage,
     };
     summary.print_losses(&stimuli.sensor);
+    if recording.read > 0 && replayed.histograms.counts().iter().all(|&count| count == 0) {
+        note(nothing_counted::sentence(&stimuli, recording.read));
+    }
     let out = args.out.as_deref();
     write(&stimuli.sensor, &replayed.histograms, out, format)?;
     if args.json {

@@ -89,6 +89,12 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
     let sensor = args.sensor.read_if_given()?;
     let sensor = sensor.as_deref();
     let testbenches = chosen(&args.names, sensor)?;
+    let has_library = sensor.is_some_and(|sensor| !sensor.liberty.as_os_str().is_empty());
+    if has_library && testbenches.iter().any(|tb| tb.name == "p_counter") {
+        note(
+            "p_counter runs with the built-in delays, whatever the library; `gdtof timing` has the ripple in the library's cells",
+        );
+    }
     let entries = if args.list {
         let listed = |testbench| Entry::new(testbench, None);
         testbenches.iter().map(listed).collect()

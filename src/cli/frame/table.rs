@@ -81,7 +81,7 @@ fn without_a_depth(summary: &FrameSummary) -> Option<String> {
 /// Whether the chip can be clocked so fast, and how much is left.
 fn timing_of(settings: &FrameSettings, timing: &VerdictReport) -> String {
     let slack = Time::from_s(timing.slack_ps.abs() * 1e-12);
-    let mhz = settings.sensor.clk_hz * 1e-6;
+    let mhz = settings.sensor.clk_hz / 1e6;
     if timing.met {
         format!("met at {mhz} MHz, {slack} left")
     } else {

@@ -139,7 +139,7 @@ fn answer(
     verdict: &TimingVerdict,
     highest: Option<&HighestClock>,
 ) -> String {
-    let own_mhz = config.clk_hz * 1e-6;
+    let own_mhz = config.clk_hz / 1e6;
     let kept = if verdict.is_met() { "keeps" } else { "breaks" };
     let rest = match highest {
         None => "at every CLK down to a sixteenth of it, too".to_owned(),
@@ -151,7 +151,13 @@ fn answer(
             }
         }
     };
-    format!("This chip {kept} its timing at {own_mhz} MHz; {rest}.\n")
+    let uneven = config
+        .counter_law()
+        .and_then(|law| law.uneven())
+        .map_or(String::new(), |why| {
+            format!(" Its P-counter cannot be used: {why}.")
+        });
+    format!("This chip {kept} its timing at {own_mhz} MHz; {rest}.{uneven}\n")
 }
 
 /// The highest CLK as JSON: `null` where there is none.

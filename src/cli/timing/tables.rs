@@ -402,7 +402,7 @@ pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
         "too fast from (C) down",
     ];
     let range = factor_range(config, silicon, Limits::Kept);
-    let mhz = config.clk_hz * 1e-6;
+    let mhz = config.clk_hz / 1e6;
     let title = match range {
         None => format!("Where {mhz} MHz fails: everywhere"),
         Some(range) => {

@@ -13,8 +13,7 @@ use super::stray_light::with_stray_light;
 use super::truth::{GroundTruth, PreviousWorld};
 use super::view::{Glimpse, View};
 use crate::photon::{
-    CROSSTALK_DELAY, Echo, Glint, PhotonBudget, PixelLight, PulseTrain, SpadLayout, SpadModel,
-    merged,
+    CROSSTALK_DELAY, Echo, Glint, PhotonBudget, PixelLight, SpadLayout, SpadModel, merged,
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 use crate::units::TimeOfFlight;

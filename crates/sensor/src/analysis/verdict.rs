@@ -50,7 +50,8 @@ enum Fault {
     Race(Race),
     /// The strobe is clear of the shift register's changes, but between other ones than the library's.
     #[error(
-        "windows end {bins} bins later than the window law says, which uses the library's delays; give another clk_hz, or silicon nearer to the library's"
+        "windows end {bins} {} later than the window law says, which uses the library's delays; give another clk_hz, or silicon nearer to the library's",
+        if *bins == 1 { "bin" } else { "bins" }
     )]
     Slipped {
         /// By how many bins.

@@ -151,7 +151,6 @@ impl PixelStream<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::photon::{
         OtherLaser, PhotonStream, PixelLight, PulseTrain, SpadModel, StreamConfig,
     };
