@@ -201,6 +201,7 @@ def test_tables_of_pandas_and_arrow_are_ranged(tmp_path: Path, command: Command)
         found = detector.range(given)
         assert found.depth.shape == (3,) and np.array_equal(found.depth, depths), type(given)
     assert detector.range(wide.iloc[:0]).returns.shape == (0, 4)
+    assert repr(found) == "<Detected: 3 depths of 3 zones>"
     refused: list[tuple[Any, str]] = [
         (lists, "numbers of bins"),
         ([[1] * 48, [1] * 47], "numbers of bins"),

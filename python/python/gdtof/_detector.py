@@ -15,7 +15,7 @@ from ._arguments import whole
 from .errors import InputError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Detected:
     """What :meth:`Detector.range` gives; arrays of the shape of the zones."""
 
@@ -37,6 +37,9 @@ class Detected:
     """Their photons."""
     reason: NDArray[np.str_]
     """Why there is no depth; empty where there is one."""
+
+    def __repr__(self) -> str:
+        return f"<Detected: {np.count_nonzero(np.isfinite(self.depth))} depths of {self.depth.size} zones>"
 
 
 class Agreement(NamedTuple):
