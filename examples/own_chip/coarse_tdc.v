@@ -25,6 +25,7 @@ module coarse_tdc #(
     output reg [BITS-1:0] read_count
 );
     localparam TIMES = $clog2(BINS + 2);
+    localparam PIXEL_BITS = $clog2(PIXELS);
 
     // High from STOP to the next edge of CLK.
     reg begins;
@@ -46,30 +47,41 @@ module coarse_tdc #(
     wire counts = coarse != 0 && coarse != BINS + 1;
     wire [$clog2(BINS)-1:0] bin = coarse[$clog2(BINS)-1:0] - 1'b1;
 
-    // A pixel: an asynchronous catcher, a synchroniser, and its histogram in one word.
-    wire [BITS-1:0] shown [0:PIXELS-1];
+    // Whether a photon has come since STOP. These are the only flip-flops with a clock of their own for each pixel.
+    wire [PIXELS-1:0] caught;
     genvar g;
     generate
         for (g = 0; g < PIXELS; g = g + 1) begin : pixel
-            reg caught;
+            reg high;
             always @(posedge spad[g] or posedge stop)
-                if (stop) caught <= 0;
-                else caught <= 1;
-
-            reg [1:0] sync;
-            wire first = sync[0] & ~sync[1];
-            always @(posedge clk or posedge rst)
-                if (rst) sync <= 2'b11;
-                else if (begins) sync <= {1'b0, caught};
-                else sync <= {sync[0], caught};
-
-            reg [BINS*BITS-1:0] histogram;
-            always @(posedge clk or posedge rst)
-                if (rst) histogram <= 0;
-                else if (counts && first) histogram[bin*BITS +: BITS] <= histogram[bin*BITS +: BITS] + 1'b1;
-            assign shown[g] = histogram[read_bin*BITS +: BITS];
+                if (stop) high <= 0;
+                else high <= 1;
+            assign caught[g] = high;
         end
     endgenerate
+
+    // Brought to CLK. A photon is counted at the first edge that shows it.
+    reg [PIXELS-1:0] sync, late;
+    wire [PIXELS-1:0] first = sync & ~late;
+    always @(posedge clk or posedge rst)
+        if (rst) begin
+            sync <= {PIXELS{1'b1}};
+            late <= {PIXELS{1'b1}};
+        end else begin
+            sync <= caught;
+            late <= begins ? {PIXELS{1'b0}} : sync;
+        end
+
+    // The histograms of all pixels, one after the other.
+    reg [BITS-1:0] histogram [0:PIXELS*BINS-1];
+    integer p;
+    always @(posedge clk or posedge rst)
+        if (rst)
+            for (p = 0; p < PIXELS * BINS; p = p + 1) histogram[p] <= 0;
+        else if (counts)
+            for (p = 0; p < PIXELS; p = p + 1)
+                if (first[p])
+                    histogram[{p[PIXEL_BITS-1:0], bin}] <= histogram[{p[PIXEL_BITS-1:0], bin}] + 1'b1;
 
     always @(posedge clk or posedge rst) begin
         if (rst) begin
@@ -77,7 +89,7 @@ module coarse_tdc #(
             read_count <= 0;
         end else begin
             read_valid <= read;
-            read_count <= shown[read_pixel];
+            read_count <= histogram[{read_pixel, read_bin}];
         end
     end
 endmodule

@@ -2,8 +2,8 @@
 
     python examples/own_chip/own_chip.py out
 
-`gdtof` draws the SPAD pulses. `coarse_tdc.v` runs in Icarus under cocotb. Its counts are compared with a model of twenty lines, one by one,
-and with the mean histogram of the light. Then they are ranged, and the depths compared with the scene's truth.
+`gdtof` draws the SPAD pulses. `coarse_tdc.v` runs under cocotb in Icarus, or in the simulator that SIM names. Its counts are compared with a
+model of twenty lines, one by one. Then they are ranged, and the depths compared with the scene's truth.
 """
 
 import os

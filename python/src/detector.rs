@@ -61,16 +61,23 @@ pub(crate) fn detector_crosstalk<'py>(
     let zones: Vec<Vec<u32>> = (sums.as_array().rows().into_iter())
         .map(|zone| zone.to_vec())
         .collect();
-    let light = |zone: &Vec<u32>| {
-        let mut light = if is_fit {
+    let light_of = |(number, zone): (usize, &Vec<u32>)| {
+        let light = if is_fit {
             detector.fitted_crosstalk(zone, histograms)
         } else {
             detector.measured_crosstalk(zone, histograms)
         };
+        let mut light = light.map_err(|error| {
+            let message = format!("zone {number} {error}; correct pulse_fwhm_ns and start_ns, or leave the bins of the glass out");
+            Failure::argument("counts", message)
+        })?;
         light.resize(bins, 0.0);
-        light
+        Ok(light)
     };
-    let light: Vec<f64> = zones.par_iter().flat_map_iter(light).collect();
+    let light: Vec<Result<Vec<f64>, Failure>> =
+        zones.par_iter().enumerate().map(light_of).collect();
+    let light: Vec<Vec<f64>> = light.into_iter().collect::<Result<_, _>>()?;
+    let light: Vec<f64> = light.into_iter().flatten().collect();
     Ok(map(py, (zones.len(), bins), light).into_any())
 }
 

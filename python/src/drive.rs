@@ -6,7 +6,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use guided_dtof::request::{Spelling, check_drive_times};
 use guided_dtof::scene::PinholeCamera;
 use guided_dtof::system::{
-    DriveFrame, DriveSettings, DriveSimulation as Frames, FrameClock, Noise, WindowPolicy,
+    DriveFrame, DriveSettings, DriveSimulation as Frames, EngineKind, FrameClock, FrameSettings,
+    Noise, WindowPolicy, drive_scale_m,
 };
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -71,6 +72,8 @@ pub(crate) struct Drive {
     watch: Watch,
     shape: (usize, usize),
     camera: PinholeCamera,
+    /// What all frames have in common.
+    described: Described,
     /// From one frame to the next, s.
     #[pyo3(get)]
     period_s: f64,
@@ -79,8 +82,57 @@ pub(crate) struct Drive {
     chip_s: (f64, f64, f64),
 }
 
+/// The settings that all frames of a drive have in common.
+struct Described {
+    sensor: Py<Sensor>,
+    scene: Py<Scene>,
+    stop_periods: u32,
+    laser_cycles: u32,
+    seed: u64,
+    engine: EngineKind,
+    scale_m: (f32, f32),
+}
+
+impl Described {
+    fn new(py: Python<'_>, scene_name: String, settings: FrameSettings) -> PyResult<Self> {
+        let scale_m = drive_scale_m(&settings.scene);
+        let (stop_periods, laser_cycles) = (
+            settings.exposure.stop_periods,
+            settings.exposure.laser_cycles,
+        );
+        let (chip, world) = (settings.sensor, settings.scene);
+        Ok(Described {
+            sensor: Py::new(py, Sensor { chip })?,
+            scene: Py::new(
+                py,
+                Scene {
+                    world,
+                    name: scene_name,
+                },
+            )?,
+            stop_periods,
+            laser_cycles,
+            seed: settings.seed,
+            engine: settings.engine,
+            scale_m,
+        })
+    }
+
+    fn add_to(&self, dict: &Bound<'_, PyDict>) -> PyResult<()> {
+        let py = dict.py();
+        dict.set_item("sensor", &self.sensor)?;
+        dict.set_item("scene", &self.scene)?;
+        dict.set_item("stop_periods", self.stop_periods)?;
+        dict.set_item("laser_cycles", self.laser_cycles)?;
+        dict.set_item("seed", self.seed)?;
+        dict.set_item("engine", by_json(py, &self.engine)?)?;
+        dict.set_item("scale_m", self.scale_m)
+    }
+}
+
 /// What is known of a drive before its first frame.
 struct Beginning {
+    settings: Box<FrameSettings>,
     shape: (usize, usize),
     camera: PinholeCamera,
     period_s: f64,
@@ -102,6 +154,7 @@ impl Drive {
     ) -> PyResult<Self> {
         let request = request(keys)?;
         let (sensor, world) = (Sensor::or_default(sensor), Scene::or_default(scene));
+        let scene_name = Scene::name_or_default(scene);
         let guide = Guide::or_default(guide);
         let drive_keys: DriveKeys = typed(to_table(drive_keys)?)?;
         let noise = drive_keys.check()?;
@@ -141,6 +194,7 @@ impl Drive {
         })?;
         let (_, beginning) = wait(py, begun, &watch, None);
         let Beginning {
+            settings,
             shape,
             camera,
             period_s,
@@ -154,6 +208,7 @@ impl Drive {
             watch,
             shape,
             camera,
+            described: Described::new(py, scene_name, *settings)?,
             period_s,
             chip_s,
         })
@@ -179,7 +234,9 @@ impl Drive {
                     line.take = Some(take);
                 }
                 drop(line);
-                to_dict(py, (self.shape, self.camera), taken)
+                let dict = to_dict(py, (self.shape, self.camera), taken)?;
+                self.described.add_to(&dict)?;
+                Ok(dict)
             }
             Err(raised) => {
                 *line = None;
@@ -222,6 +279,7 @@ fn take_frames(
     let sensor = &settings.frame.sensor;
     let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let beginning = Beginning {
+        settings: Box::new(settings.frame.clone()),
         shape: (sensor.rows, sensor.cols),
         camera: settings.frame.scene.lidar_camera(rows, cols),
         period_s: drive.period_s(),

@@ -7,12 +7,13 @@ use guided_dtof::engine::waveform::WaveCycles;
 use guided_dtof::request::FrameRequest;
 use guided_dtof::scene::PinholeCamera;
 use guided_dtof::system::{
-    FrameSettings, GateProbe, NoDepth, PixelDepth, WindowPolicy, take_frame_by, take_guided_frame,
+    Frame, FrameSettings, GateProbe, NoDepth, PixelDepth, WindowPolicy, take_frame_by,
+    take_guided_frame,
 };
 use guided_dtof::{guide::GuideInput, units::Time};
 use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 use rayon::prelude::*;
 
 use crate::arrays::{cube, map, of_start, set_returns, starts as start_values};
@@ -237,10 +238,18 @@ pub(crate) fn frame<'py>(
     dict.set_item("summary", summary)?;
     let chip = settings.sensor.clone();
     dict.set_item("sensor", Sensor { chip })?;
+    let scene = Scene {
+        world: settings.scene.clone(),
+        name: scene_name.clone(),
+    };
+    dict.set_item("scene", scene)?;
+    dict.set_item("seed", request.seed)?;
+    dict.set_item("engine", by_json(py, &request.engine)?)?;
     dict.set_item("stop_periods", exposure.stop_periods)?;
     dict.set_item("laser_cycles", exposure.laser_cycles)?;
     dict.set_item("bin_m", frame.bin_m)?;
     dict.set_item("remark", frame.remark.as_deref())?;
+    dict.set_item("hints", hints(py, &frame)?)?;
     dict.set_item("work", by_json(py, &frame.work)?)?;
     dict.set_item("kept", by_json(py, &frame.kept)?)?;
     dict.set_item("run_times", by_json(py, &frame.times)?)?;
@@ -253,6 +262,15 @@ pub(crate) fn frame<'py>(
         FrameRecord::new(scene_name, request, settings, frame),
     )?;
     Ok(dict)
+}
+
+/// Hints as their fields, with the numbers of `gdtof.Reason`.
+fn hints<'py>(py: Python<'py>, frame: &Frame) -> PyResult<Bound<'py, PyList>> {
+    let fields = frame.hints.iter().map(|hint| {
+        let number = NoDepth::number(Some(hint.reason));
+        (number, hint.surfaces, hint.sentence.as_str())
+    });
+    PyList::new(py, fields.collect::<Vec<_>>())
 }
 
 /// What the guide of a single frame looks at.

@@ -32,7 +32,7 @@ use crate::values::{
 pub(crate) struct Scene {
     pub(crate) world: World,
     #[pyo3(get)]
-    name: String,
+    pub(crate) name: String,
 }
 
 /// Most objects that `repr` names.

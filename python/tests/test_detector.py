@@ -1,11 +1,16 @@
 """Histograms of any sensor."""
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import gdtof
 import numpy as np
+import pandas
+import pyarrow.parquet
 import pytest
 from conftest import Command
 
@@ -34,6 +39,33 @@ def drawn(detector: gdtof.Detector, depths: np.ndarray, photons: float, backgrou
             if detector.first_of is not None:
                 bins = np.sort(bins)[:1]
             np.add.at(counts[zone], bins, 1)
+    return counts
+
+
+def drawn_together(
+    detector: gdtof.Detector, depths: list[float], photons: list[float], background: float, seed: int
+) -> np.ndarray:
+    """Counts of SPADs that fire together, drawn photon by photon, with the light of several surfaces in each laser cycle."""
+    random = np.random.default_rng(seed)
+    assert detector.coincidence is not None and detector.laser_cycles is not None and detector.start_ns is not None
+    spads, within_ns, of = detector.coincidence
+    counts = np.zeros(detector.bins, dtype=np.int64)
+    before, span = 10.0, detector.bins * BIN_NS
+    for _ in range(detector.laser_cycles):
+        parts = [
+            random.normal(2 * depth / 0.299792458, FWHM_NS / 2.354820045, random.poisson(number / detector.laser_cycles))
+            for depth, number in zip(depths, photons, strict=True)
+        ]
+        dark = random.poisson(background * (1 + before / span) / detector.laser_cycles)
+        parts.append(random.uniform(detector.start_ns - before, detector.start_ns + span, dark))
+        last_ns: dict[int, float] = {}
+        for time_ns in np.sort(np.concatenate(parts)).tolist():
+            spad = int(random.integers(of))
+            high = {other for other, at in last_ns.items() if time_ns - at < within_ns}
+            one_bin = int((time_ns - detector.start_ns) // BIN_NS)
+            if spad not in high and len(high) + 1 == spads and 0 <= one_bin < detector.bins:
+                counts[one_bin] += 1
+            last_ns[spad] = time_ns
     return counts
 
 
@@ -120,6 +152,78 @@ def test_a_surface_in_the_flank_of_a_glass_is_ranged() -> None:
         detector.crosstalk(counts)
     with pytest.raises(gdtof.InputError, match="crosstalk"):
         detector.range(counts, crosstalk=np.zeros(47))
+
+
+def test_a_glass_is_ranged_through_where_spads_fire_together() -> None:
+    pair = gdtof.Detector(
+        bins=48, bin_ns=BIN_NS, pulse_fwhm_ns=FWHM_NS, start_ns=-4.0, laser_cycles=4000, coincidence=gdtof.Coincidence(2, 4.0, 16)
+    )
+    alone = np.stack([drawn_together(pair, [0.0], [6000], 4000, seed) for seed in range(3)])[:, None]
+    light = pair.crosstalk(alone)
+    # Photons, and not the fewer events that they make.
+    assert light.shape == (1, 48) and abs(light.sum() / 6000 - 1) < 0.1 and light.sum() > 1.5 * alone.mean(axis=0).sum()
+    depths = np.array([0.35, 0.5, 2.0, 4.0])
+    counts = np.stack([drawn_together(pair, [0.0, depth], [6000, 4000], 4000, 7) for depth in depths])
+    found = pair.range(counts, crosstalk=light[0])
+    # Counts of the surface in the light of the glass: the glass as it was measured is off by its own noise.
+    assert (np.abs(found.depth - depths) < 6 * found.bound).all()
+    assert (np.abs(pair.range(counts).depth) < 0.3).all()
+    fitted = pair.crosstalk(counts[None, 2:], fit=True)
+    assert (np.abs(fitted.sum(axis=1) / 6000 - 1) < 0.1).all()
+    away = np.stack([drawn_together(pair, [4.0], [4000], 4000, seed) for seed in range(2)])[:, None]
+    assert (pair.crosstalk(away, fit=True) == 0).all()
+    flat = np.zeros((1, 1, 48), dtype=int)
+    flat[..., 3:15] = 400
+    with pytest.raises(gdtof.InputError, match="zone 0 has counts of SPADs that fire together .* pulse_fwhm_ns"):
+        pair.crosstalk(flat)
+
+
+def test_tables_of_pandas_and_arrow_are_ranged(tmp_path: Path, command: Command) -> None:
+    detector = tof()
+    counts = np.stack([detector.expected(depth, 900, 480) for depth in (2.0, 3.0, 4.0)]).round().astype(np.uint16)
+    depths = detector.range(counts).depth
+    lists = pandas.DataFrame({"zone": [0, 1, 2], "counts": list(counts)})
+    wide = pandas.DataFrame(counts)
+    file = tmp_path / "captures.parquet"
+    lists.to_parquet(file)
+    table = pyarrow.parquet.read_table(file)
+    for given in (
+        lists["counts"],
+        lists[["counts"]],
+        lists["counts"].to_numpy(),
+        wide,
+        wide.astype("Int32"),
+        pandas.read_parquet(file)["counts"],
+        table["counts"],
+        table.select(["counts"]),
+        counts.tolist(),
+    ):
+        found = detector.range(given)
+        assert found.depth.shape == (3,) and np.array_equal(found.depth, depths), type(given)
+    assert detector.range(wide.iloc[:0]).returns.shape == (0, 4)
+    assert repr(found) == "<Detected: 3 depths of 3 zones>"
+    refused: list[tuple[Any, str]] = [
+        (lists, "numbers of bins"),
+        ([[1] * 48, [1] * 47], "numbers of bins"),
+        (pandas.Series([[1] * 48, [1] * 47]), "numbers of bins"),
+        (lists["zone"], "48 bins in the last axis"),
+        (None, "whole ones"),
+        (counts + 0.5, r"holds \d+\.5; give whole numbers"),
+        (counts * np.nan, "holds nan; give whole numbers"),
+        (wide.astype("Int32").reindex([0, 5]), "whole ones"),
+        (wide.reindex([0, 5]), "holds nan"),
+    ]
+    for given, words in refused:
+        with pytest.raises(gdtof.InputError, match=words):
+            detector.range(given)
+    # The command says what to do, and it does.
+    words = "range --format counts --bin-width-ns 1 --pulse-fwhm-ns 2 --histograms"
+    said = command(*words.split(), file, fails=True)
+    assert "is a Parquet file" in said
+    line = said[said.index("numpy.save") :].split(", or give")[0]
+    run = f"import numpy, pandas; {line}"
+    subprocess.run([sys.executable, "-c", run], cwd=tmp_path, check=True)
+    assert np.array_equal(np.load(tmp_path / "counts.npy"), counts)
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])

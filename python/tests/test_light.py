@@ -30,6 +30,7 @@ def test_pulses_of_the_command(
     light = gdtof.light("street", gdtof.Sensor(rows=3, cols=4), **keys)
     photons = light.photons(laser_cycles=40, **drawn)  # type: ignore[arg-type]
     assert len(photons) == len(records) > 1000
+    assert repr(photons) == f"<Photons: {len(photons)} pulses>" and len(repr(light)) < 80
     for column in COLUMNS:
         assert np.array_equal(getattr(photons, column), records[column])
     assert np.array_equal(photons.pixel, 4 * photons.row.astype(int) + photons.col)

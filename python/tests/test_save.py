@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import html
 import json
 import pickle
 from dataclasses import replace
@@ -59,6 +60,23 @@ def test_a_saved_frame_is_the_commands(
     manifests = [json.loads((folder / "manifest.json").read_text()) for folder in (ours, theirs)]
     assert manifests[0]["configuration"] == manifests[1]["configuration"]
     assert manifests[0]["complete"] and manifests[0]["command"] == "frame"
+
+
+def test_hints_are_data(command: Command, tmp_path: Path) -> None:
+    """Cars nearer than the camera pair begins have no guide."""
+    scene = gdtof.Scene("street", {"stereo.max_disparity_px": 180})
+    frame = gdtof.frame(gdtof.Sensor(rows=32, cols=32), scene, laser_cycles=200)
+    [hint] = frame.hints
+    without = (frame.reason == gdtof.Reason.NO_GUIDE) & np.isfinite(frame.truth)
+    assert hint.reason is gdtof.Reason.NO_GUIDE and hint.surfaces == np.count_nonzero(without) > 0
+    assert html.escape(hint.sentence) in frame._repr_html_() and frame.to_xarray().attrs["hints"] == hint.sentence
+    frame.save(tmp_path / "ours")
+    words = "frame --rows 32 --cols 32 --probe none --laser-cycles 200 --set scene.stereo.max_disparity_px=180 --out".split()
+    assert hint.sentence in command(*words, tmp_path / "theirs")
+    hints = told(tmp_path / "ours")["hints"]
+    assert hints == told(tmp_path / "theirs")["hints"]
+    assert hints == [{"reason": "no_guide", "surfaces": hint.surfaces, "sentence": hint.sentence}]
+    assert pickle.loads(pickle.dumps(frame)).hints == frame.hints
 
 
 @pytest.mark.parametrize("of", ["plain", "map", "starts", "tracking", "probed"])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from PIL import Image
 
 import gdtof
@@ -134,6 +135,50 @@ def test_datasets_go_into_netcdf_and_come_back(frame: gdtof.Frame, tmp_path: Pat
             assert np.array_equal(back["depth"], taken.depth, equal_nan=True)
             assert back["reason"].attrs["flag_meanings"].split()[1] == "no_surface"
             assert back.attrs.get("remark") == getattr(taken, "remark", None)
+            # What it was taken with: numbers are numbers, and settings are read back from their text.
+            assert back.attrs["seed"] == taken.seed and isinstance(back.attrs["seed"], np.integer)
+            assert back.attrs["laser_cycles"] == taken.laser_cycles and isinstance(back.attrs["bin_m"], np.floating)
+            assert back.attrs["engine"] == taken.engine == "window"
+            assert gdtof.Sensor.from_toml(back.attrs["sensor"]) == taken.sensor
+            assert gdtof.Scene.from_toml(back.attrs["scene"], back.attrs["scene_name"]) == taken.scene
+
+
+def test_a_dataset_says_how_its_frame_was_taken(tmp_path: Path) -> None:
+    sensor = gdtof.Sensor(rows=4, cols=4, bins=12)
+    dusk = gdtof.Scene("van", {"light.illuminance_klux": 1.5})
+    taken = gdtof.frame(sensor, dusk, seed=2**63 - 1, engine="cycle", laser_cycles=20, stop_periods=300)
+    taken.to_xarray().to_netcdf(tmp_path / "frame.nc")
+    with xarray.open_dataset(tmp_path / "frame.nc") as back:
+        attrs = back.attrs
+    assert int(attrs["seed"]) == 2**63 - 1 and attrs["engine"] == "cycle" and attrs["stop_periods"] == 300
+    again = gdtof.frame(
+        gdtof.Sensor.from_toml(attrs["sensor"]),
+        gdtof.Scene.from_toml(attrs["scene"]),
+        seed=int(attrs["seed"]),
+        engine=attrs["engine"],
+        laser_cycles=int(attrs["laser_cycles"]),
+        stop_periods=int(attrs["stop_periods"]),
+    )
+    assert np.array_equal(again.histograms, taken.histograms) and taken.histograms.any()
+    kept = gdtof.frame(sensor, dusk, tolerance_m=0.05, laser_cycles=20)
+    assert kept.to_xarray().attrs["tolerance_m"] == 0.05
+
+
+def test_all_frames_of_a_drive_have_one_scale(frame: gdtof.Frame) -> None:
+    def ends(figure: Figure) -> tuple[float, float]:
+        limits: tuple[float, float] = figure.axes[0].images[0].get_clim()
+        return limits
+
+    with gdtof.drive("van", gdtof.Sensor(rows=8, cols=8), frames=2, laser_cycles=200) as moving:
+        frames = list(moving)
+    scales = {ends(taken.plot("depth", show=False)) for taken in frames}
+    assert scales == {ends(taken.plot("truth", show=False)) for taken in frames} == {frames[0].scale_m}
+    near, far = frames[0].scale_m
+    # What the camera pair measures, and not what one frame has.
+    depths = frames[0].depth[np.isfinite(frames[0].depth)]
+    assert near < depths.min() and depths.max() < far <= 200 and (near, far) != (np.floor(depths.min()), np.ceil(depths.max()))
+    depths = frame.depth[np.isfinite(frame.depth)]
+    assert ends(frame.plot("depth", show=False)) == (np.floor(depths.min()), np.ceil(depths.max()))
 
 
 def test_tables_have_a_row_for_each_macropixel(frame: gdtof.Frame) -> None:

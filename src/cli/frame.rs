@@ -153,7 +153,7 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
             say_unless_quiet(format_args!("\n{remark}\n"))?;
         }
         for hint in &frame.hints {
-            say_unless_quiet(format_args!("\n{hint}\n"))?;
+            say_unless_quiet(format_args!("\n{}\n", hint.sentence))?;
         }
         for note in &timing.notes {
             say_unless_quiet(format_args!("\nNote on timing: {note}\n"))?;

@@ -315,12 +315,13 @@ impl Report {
     }
 
     fn table(&self, args: &PhotonsArgs, has_starts: bool) -> String {
+        let to_fs = |ns: f64| libm::round(1e6 * ns) / 1e6;
         let asked = &self.configuration;
         let table = Table::new(format!("Pulses of {}", asked.scene_name))
             .row("macropixels", self.macropixels)
             .row("SPADs of each", asked.spads)
             .row("laser cycles", asked.laser_cycles)
-            .row("laser period", format!("{} ns", asked.period_ns))
+            .row("laser period", format!("{} ns", to_fs(asked.period_ns)))
             .row("photons and dark counts", self.photons)
             .row("pulses", self.pulses);
         let folder = args.out.display();

@@ -19,8 +19,8 @@ use crate::files::{InputError, OutputFile, file_hash, parse_json};
 use crate::report::{DepthImage, ImageCell, write_npy_u16};
 use crate::scene::{EyeSafety, Scene, Train};
 use crate::system::{
-    DistanceLaw, EngineKind, Frame, FrameSettings, FrameSummary, NoDepth, PhaseTimes, PixelDepth,
-    ToleranceResult, frame_scale_m,
+    DepthHint, DistanceLaw, EngineKind, Frame, FrameSettings, FrameSummary, NoDepth, PhaseTimes,
+    PixelDepth, ToleranceResult, frame_scale_m,
 };
 
 /// What frame.json and drive.json say of an exposure alike, first of all.
@@ -63,6 +63,7 @@ pub struct FrameReport<'a, P = ()> {
     pub configuration: FrameConfiguration<'a>,
     summary: FrameSummary,
     remark: Option<&'a str>,
+    hints: &'a [DepthHint],
     photons_expected: f64,
     work: EngineWork,
     timing: &'a VerdictReport,
@@ -176,6 +177,7 @@ impl<'a, P> FrameReport<'a, P> {
             },
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
+            hints: &frame.hints,
             photons_expected: frame.photons_expected,
             work: frame.work,
             timing,

@@ -16,7 +16,7 @@ use super::light::{light_in, lit_pixels, photon_stream, starts_of, truth_in};
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{PixelContext, Ranger};
-use super::remark::Circumstances;
+use super::remark::{Circumstances, DepthHint};
 use super::result::{Frame, PhaseTimes};
 use super::settings::{EngineKind, FrameSettings, GateProbe};
 use super::shared::{SharedView, SharedWork};
@@ -168,7 +168,7 @@ struct FrameDepths {
     depths: Vec<PixelDepth>,
     bin_s: f64,
     remark: Option<String>,
-    hints: Vec<String>,
+    hints: Vec<DepthHint>,
     took_s: f64,
 }
 

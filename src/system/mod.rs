@@ -43,6 +43,7 @@ pub use pixel::{DepthReturn, DepthReturns, NoDepth, PixelDepth, RETURNS};
 pub use policy::{NoBins, Pointing, Unguided, Why, WindowPolicy};
 pub(crate) use ranger::{PixelContext, Ranger};
 pub use ranger::{Reading, check_counts, range_counts};
+pub use remark::DepthHint;
 pub use reranged::ArrayDepths;
 pub use result::{Frame, PhaseTimes};
 pub use settings::{EngineKind, FrameSettings, GateProbe};

@@ -1,6 +1,8 @@
 //! Sentences on why surfaces of a frame have no depth, with the numbers behind it and what would help: on the commonest reason if most have none, and
 //! hints on rarer reasons that settings can change.
 
+use serde::Serialize;
+
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::{EventType, Exposure, Mode, Sensor, SensorConfig, WindowLaw};
 use crate::guide::Guide;
@@ -14,6 +16,17 @@ const FULL_OF_BACKGROUND: f64 = 0.2;
 
 /// Least share of surfaces without a depth for a reason that is worth a hint: chosen.
 const WORTH_A_HINT: f64 = 0.01;
+
+/// What would help against a reason for missing depths.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct DepthHint {
+    /// The reason.
+    pub reason: NoDepth,
+    /// Surfaces that have no depth for it.
+    pub surfaces: usize,
+    /// How many they are, why, and what to change.
+    pub sentence: String,
+}
 
 /// A frame's circumstances.
 pub(super) struct Circumstances<'a> {
@@ -65,23 +78,32 @@ impl Circumstances<'_> {
         ))
     }
 
-    /// A sentence for each reason that settings can change and that is not rare, except the remark's.
-    pub(super) fn hints(&self) -> Vec<String> {
+    /// One for each reason that settings can change and that is not rare, except the remark's.
+    pub(super) fn hints(&self) -> Vec<DepthHint> {
         let is_said = self.reason_of_most();
         let is_worth_it = |reason: NoDepth| {
             is_said != Some(reason)
                 && self.count_without(reason) as f64 > WORTH_A_HINT * self.surfaces() as f64
         };
+        let hint = |reason: NoDepth, what: String| {
+            let surfaces = self.count_without(reason);
+            DepthHint {
+                reason,
+                surfaces,
+                sentence: format!("{surfaces} surfaces {what}"),
+            }
+        };
         let mut hints = Vec::new();
         if is_worth_it(NoDepth::NoGuide) {
-            let (count, why) = (self.count_without(NoDepth::NoGuide), self.no_guide());
-            hints.push(format!(
-                "{count} surfaces have no guide: {why}; unguided = \"neighbour\" takes over the estimates of neighbours"
-            ));
+            let why = self.no_guide();
+            let what = format!(
+                "have no guide: {why}; unguided = \"neighbour\" takes over the estimates of neighbours"
+            );
+            hints.push(hint(NoDepth::NoGuide, what));
         }
         if is_worth_it(NoDepth::Saturated) {
-            let (count, why) = (self.count_without(NoDepth::Saturated), self.saturated());
-            hints.push(format!("{count} surfaces are saturated: {why}"));
+            let what = format!("are saturated: {}", self.saturated());
+            hints.push(hint(NoDepth::Saturated, what));
         }
         hints
     }
@@ -352,18 +374,25 @@ mod tests {
             "from 19.3 m (max_disparity_px)",
             "unguided = \"neighbour\"",
         ] {
-            assert!(hint.contains(words), "{hint}");
+            assert!(hint.sentence.contains(words), "{hint:?}");
         }
+        let without = |p: &&PixelDepth| p.true_m.is_some() && p.no_depth == Some(NoDepth::NoGuide);
+        let surfaces = short_sighted.pixels.iter().filter(without).count();
+        assert_eq!((hint.reason, hint.surfaces), (NoDepth::NoGuide, surfaces));
+        assert!(hint.sentence.starts_with(&surfaces.to_string()));
         // The same reason is not told twice.
         let blind = frame("", |scene| scene.stereo.max_disparity_px = 20.0);
         assert!(blind.remark.unwrap().contains("no guide"));
-        assert!(!blind.hints.iter().any(|hint| hint.contains("no guide")));
+        let is_of_guide = |hint: &DepthHint| hint.reason == NoDepth::NoGuide;
+        assert!(!blind.hints.iter().any(is_of_guide), "{:?}", blind.hints);
         let full = frame("bin_bits = 9", |scene| {
             scene.lidar.pulse_energy_uj = 1.0;
             scene.light.illuminance_klux = 5.0;
         });
-        let is_of_full_bins =
-            |hint: &String| hint.contains("are saturated: bins are full at 511 counts");
+        let is_of_full_bins = |hint: &DepthHint| {
+            hint.sentence
+                .contains("are saturated: bins are full at 511 counts")
+        };
         assert!(full.hints.iter().any(is_of_full_bins), "{:?}", full.hints);
     }
 

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::pixel::PixelDepth;
+use super::remark::DepthHint;
 use super::summary::FrameSummary;
 use super::tolerance::ToleranceResult;
 use crate::engine::EngineWork;
@@ -55,8 +56,8 @@ pub struct Frame {
     pub pixels: Vec<PixelDepth>,
     /// Why most surfaces have no depth, where that is so.
     pub remark: Option<String>,
-    /// What would help against other reasons for missing depths: a sentence for each that settings can change.
-    pub hints: Vec<String>,
+    /// What would help against other reasons for missing depths: one for each that settings can change.
+    pub hints: Vec<DepthHint>,
     /// Photons and dark counts that the light makes of the whole array on average.
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.

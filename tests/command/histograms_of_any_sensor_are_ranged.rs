@@ -307,6 +307,20 @@ fn what_is_missing_or_impossible_is_said_in_a_sentence() {
     // As of a TMF8829 whose zones have 256 bins.
     let finer = r#"{"Result_Set": [{"mp_histo": [[{"bin": [1, 2, 3, 9, 1, 1]}]], "ref_histo": [{"bin": [5, 1, 0]}]}]}"#;
     std::fs::write(folder.join("finer.json"), finer).unwrap();
+    std::fs::write(folder.join("captures.parquet"), b"PAR1\x15\x04").unwrap();
+    let pair = "laser_cycles = 9000\ncoincidence = { spads = 2, within_ns = 4.0, of = 16 }\n";
+    std::fs::write(folder.join("pair.toml"), pair).unwrap();
+    // A flat stretch of light in every zone.
+    let zone = format!(
+        "{}1\n",
+        "1,400,400,400,400,400,400,400,400,400,".repeat(2) + &"1,".repeat(19)
+    );
+    let zones = table()
+        .0
+        .lines()
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+        .count();
+    std::fs::write(folder.join("flat.csv"), zone.repeat(zones)).unwrap();
     let bins = "--bin-width-ns 1 --pulse-fwhm-ns 2";
     let counts = "range --format counts --histograms counts.csv";
     for (words, says) in [
@@ -340,15 +354,19 @@ fn what_is_missing_or_impossible_is_said_in_a_sentence() {
         ),
         (
             format!("range --format tmf8829 --histograms counts.csv {bins}"),
-            "Result_Set",
+            "is a table of counts, which --format counts reads",
         ),
         (
-            format!("range --format tmf882x --histograms counts.csv {bins}"),
-            "#Raw",
+            "range --format tmf8820 --histograms finer.json".to_owned(),
+            "is a log of a TMF8829, which --format tmf8829 reads",
         ),
         (
-            format!("range --format cnh --histograms counts.csv {bins}"),
-            "Agg",
+            format!("range --format counts --histograms captures.parquet {bins}"),
+            "is a Parquet file, which Python reads",
+        ),
+        (
+            format!("{counts} {bins} --detector pair.toml --crosstalk flat.csv"),
+            "flat.csv: zone 0 has counts of SPADs that fire together which are no echo",
         ),
     ] {
         let refused = gdtof_words(folder, &words);

@@ -12,7 +12,7 @@ Distances are metres along the ray, NaN where there is none; arrays by macropixe
 from . import errors, theory, waves
 from ._arrays import Reason
 from ._detector import Agreement, Coincidence, Detected, Detector
-from ._frame import Drive, DriveFrame, Frame, Maps, drive, frame
+from ._frame import Drive, DriveFrame, Frame, Hint, Maps, drive, frame
 from ._gdtof import Guide, Problem, Scene, Sensor, __version__
 from ._histograms import Exposed, Ranged, Replayed, expose, range, replay
 from ._light import Light, Photons, light
@@ -32,6 +32,7 @@ __all__ = [
     "Exposed",
     "Frame",
     "Guide",
+    "Hint",
     "InputError",
     "Light",
     "Maps",

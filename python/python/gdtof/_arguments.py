@@ -52,7 +52,10 @@ def whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
     if np.ma.is_masked(values):
         raise InputError(f"{name}: is masked in places; fill them with what they are")
     array = np.asarray(values)
-    if array.dtype.kind == "f" and array.size and np.all(array == np.trunc(array)):
+    if array.dtype.kind == "f":
+        is_whole = (array == np.trunc(array)) & (np.abs(array) < 2.0**63)
+        if not is_whole.all():
+            raise InputError(f"{name}: holds {array[~is_whole][0]}; give whole numbers")
         array = array.astype(np.int64)
     if array.dtype.kind not in "iub" and array.size:
         raise InputError(f"{name}: holds numbers of type {array.dtype}; give whole ones")

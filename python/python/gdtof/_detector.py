@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from ._arguments import whole
 from .errors import InputError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Detected:
     """What :meth:`Detector.range` gives; arrays of the shape of the zones."""
 
@@ -38,6 +38,9 @@ class Detected:
     reason: NDArray[np.str_]
     """Why there is no depth; empty where there is one."""
 
+    def __repr__(self) -> str:
+        return f"<Detected: {np.count_nonzero(np.isfinite(self.depth))} depths of {self.depth.size} zones>"
+
 
 class Agreement(NamedTuple):
     """What :meth:`Detector.check` gives."""
@@ -48,6 +51,27 @@ class Agreement(NamedTuple):
     """Cells that were compared; bins with few counts are put together."""
     p: float
     """Chance that counts of the expected light deviate at least as much. Below 0.001 the counts are of other light, or counted wrong."""
+
+
+def _rows(counts: Any) -> Any:
+    """Tables of pandas and Arrow as arrays: with a column for each bin, or one column of lists."""
+    if hasattr(counts, "to_pandas"):
+        counts = counts.to_pandas()
+    if np.ma.isMaskedArray(counts):
+        return counts
+    unequal = InputError("counts: has zones with different numbers of bins; give each zone as many")
+    try:
+        array = np.asarray(counts)
+    except ValueError:
+        raise unequal from None
+    if array.dtype.kind != "O" or array.size == 0:
+        return array
+    if array.ndim == 2 and array.shape[1] == 1:
+        array = array[:, 0]
+    cells = [np.asarray(cell) for cell in array.ravel()]
+    if len({cell.shape for cell in cells}) > 1:
+        raise unequal
+    return np.stack(cells).reshape(array.shape + cells[0].shape)
 
 
 def _plain(number: object) -> object:
@@ -147,7 +171,7 @@ class Detector:
         return self.bins, json.dumps(keys, default=_plain)
 
     def _zones(self, counts: ArrayLike) -> tuple[NDArray[np.uint32], tuple[int, ...]]:
-        numbers = whole("counts", counts)
+        numbers = whole("counts", _rows(counts))
         if numbers.ndim == 0 or numbers.shape[-1] != self.bins:
             raise InputError(f"counts: is an array of shape {numbers.shape}; give {self.bins} bins in the last axis")
         if numbers.size and not 0 <= numbers.min() <= numbers.max() <= np.iinfo(np.uint32).max:
@@ -157,6 +181,8 @@ class Detector:
     def crosstalk(self, counts: ArrayLike, *, fit: bool = False) -> NDArray[np.float64]:
         """Photons of a cover glass in each bin of one histogram, for :meth:`range`: zones × bins.
 
+        Of a coincidence, too, these are photons and not events: the light of the echoes whose mean histogram fits the counts.
+
         Parameters
         ----------
         counts
@@ -164,8 +190,6 @@ class Detector:
         fit
             Take the echo nearest to the sensor in the sum of all captures for the glass.
         """
-        if self.coincidence is not None:
-            raise InputError("coincidence: the light of a glass is not known from SPADs that fire together; leave it out")
         flat, shape = self._zones(counts)
         if len(shape) != 2:
             raise InputError(f"counts: is an array of shape {(*shape, self.bins)}; give captures × zones × bins")
@@ -187,7 +211,8 @@ class Detector:
         Parameters
         ----------
         counts
-            Whole numbers of any type, bins in the last axis, the earliest first.
+            Whole numbers of any type, bins in the last axis, the earliest first. A table of pandas or Arrow has a row for each zone, and a column
+            for each bin or one column of lists.
         crosstalk
             Photons of a cover glass in each bin, in the shape of ``counts`` or of its last axes, as of :meth:`crosstalk`.
         false_alarm_rate
@@ -219,7 +244,7 @@ class Detector:
             return np.ascontiguousarray(found[name][:, 0]).reshape(shape)
 
         def of_all(name: str) -> NDArray[np.float64]:
-            array: NDArray[np.float64] = found[name].reshape(*shape, -1)
+            array: NDArray[np.float64] = found[name].reshape(*shape, found[name].shape[-1])
             return array
 
         return Detected(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ from ._arguments import (
     sensor_of,
     starts_of,
 )
-from ._arrays import FrameArrays, Map
+from ._arrays import FrameArrays, Map, Reason
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -35,6 +35,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Engine: TypeAlias = Literal["gate", "cycle", "window", "cohort"]
+
+
+class Hint(NamedTuple):
+    """What would help against a reason for missing depths."""
+
+    reason: Reason
+    """The reason."""
+    surfaces: int
+    """Surfaces that have no depth for it."""
+    sentence: str
+    """How many they are, why, and what to change."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,7 +64,7 @@ class Maps(FrameArrays):
     ) -> Figure:
         """Maps side by side with matplotlib.
 
-        Distances have the colours of depth.png. Macropixels without a depth have the pattern of their reason, which the legend names. In a script a
+        Distances have the colours of depth.png, and in a frame of a drive those of the whole drive. Macropixels without a depth have the pattern of their reason, which the legend names. In a script a
         window opens, as by ``matplotlib.pyplot.show``.
 
         Parameters
@@ -67,7 +78,8 @@ class Maps(FrameArrays):
         """
         from ._plot import plot_maps
 
-        return plot_maps(self, [maps] if isinstance(maps, str) else list(maps), title, show)
+        names = [maps] if isinstance(maps, str) else list(maps)
+        return plot_maps(self, names, self._depth_scale_m(), title, show)
 
     def plot_histogram(self, row: int, col: int, ax: Axes | None = None, *, show: bool = True) -> Axes:
         """A macropixel's histogram over distance, with the truth, the guide's estimate and the depth; shown as by :meth:`plot`, if `ax`
@@ -76,13 +88,41 @@ class Maps(FrameArrays):
 
         return plot_histogram(self, row, col, ax, show)
 
+    sensor: _gdtof.Sensor
+    """The sensor, with a slower CLK where `bins_from_guide` asks for it."""
+    scene: _gdtof.Scene
+    """The scene."""
+    stop_periods: int
+    """CLK periods in a laser cycle."""
+    laser_cycles: int
+    """Laser cycles of the exposure."""
+    seed: int
+    """Seed of photons and of the guide's errors."""
+    engine: Engine
+    """The engine; with `tolerance_m` the one that takes what is not on the cohort engine."""
+
     def _described(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """What a dataset says of it besides its arrays: attributes, and coordinates without dimensions."""
-        return {}, {}
+        attrs = {
+            "seed": self.seed,
+            "engine": self.engine,
+            "stop_periods": self.stop_periods,
+            "laser_cycles": self.laser_cycles,
+            "sensor": self.sensor.to_toml(),
+            "scene": self.scene.to_toml(),
+            "scene_name": self.scene.name,
+        }
+        return attrs, {}
+
+    def _depth_scale_m(self) -> tuple[float, float]:
+        """Depths at the ends of the colour scale, m."""
+        return _gdtof.depth_scale_m(self.depth[np.isfinite(self.depth)].tolist())
 
     def to_xarray(self) -> xarray.Dataset:
-        """All arrays by macropixel as an xarray.Dataset with dimensions row, col, bin and edge; attributes have the units, and its
-        `to_netcdf` writes it as it is."""
+        """All arrays by macropixel as an xarray.Dataset with dimensions row, col, bin and edge.
+
+        Each array has its unit. Attributes of the dataset are what it was taken with: seed, engine, clocks, and sensor and scene as the text of
+        TOML files, which `Sensor.from_toml` and `Scene.from_toml` read. `to_netcdf` of the dataset writes all of it."""
         from ._convert import to_xarray
 
         return to_xarray(self, *self._described())
@@ -103,14 +143,10 @@ class Maps(FrameArrays):
 class Frame(Maps):
     """A frame. See :func:`frame` for how to take one, and :class:`Maps` for its arrays."""
 
-    sensor: _gdtof.Sensor
-    """The sensor, with a slower CLK where `bins_from_guide` asks for it."""
-    stop_periods: int
-    """CLK periods in a laser cycle."""
-    laser_cycles: int
-    """Laser cycles of the exposure."""
     remark: str | None
     """Why most surfaces have no depth, where that is so."""
+    hints: list[Hint]
+    """What would help against rarer reasons for missing depths."""
     kept: dict[str, Any] | None
     """Engines chosen by `tolerance_m`, and the bound they keep."""
     probes: list[tuple[int, int]]
@@ -152,16 +188,15 @@ class Frame(Maps):
         return path
 
     def _described(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        attrs: dict[str, Any] = {
-            "stop_periods": self.stop_periods,
-            "laser_cycles": self.laser_cycles,
-            "load_s": self.load_s,
-            "exposure_s": self.exposure_s,
-            "readout_s": self.readout_s,
-        }
+        attrs, placed = super()._described()
+        attrs |= {"load_s": self.load_s, "exposure_s": self.exposure_s, "readout_s": self.readout_s}
+        if self.kept is not None:
+            attrs["tolerance_m"] = self.kept["tolerance_m"]
         if self.remark is not None:
             attrs["remark"] = self.remark
-        return attrs, {}
+        if self.hints:
+            attrs["hints"] = "\n".join(hint.sentence for hint in self.hints)
+        return attrs, placed
 
     def __repr__(self) -> str:
         return f"<Frame {_outline(self)}>"
@@ -181,11 +216,17 @@ class DriveFrame(Maps):
     """From where to where windows see, m, shape (rows, cols, 2)."""
     reused: dict[str, Any]
     """What was not simulated again, because it is provably that of the frame before."""
+    scale_m: tuple[float, float]
+    """Ends of the colour scale of depths, m: the same in all frames of a drive."""
 
     def _described(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        attrs, placed = super()._described()
         middle = (self.times["exposure_s"] + self.times["readout_s"]) / 2
         said = {"long_name": "middle of the exposure on the scene's clock", "units": "s"}
-        return {"number": self.number}, {"time": ((), middle, said)}
+        return attrs | {"number": self.number}, placed | {"time": ((), middle, said)}
+
+    def _depth_scale_m(self) -> tuple[float, float]:
+        return self.scale_m
 
     def __repr__(self) -> str:
         return f"<DriveFrame {self.number}, {_outline(self)}>"
@@ -314,7 +355,8 @@ def frame(
     taken = _gdtof.frame(
         chip, scene_of(scene), guide_of(guide), keys, tracking, given, wanted, progress
     )
-    return Frame(**taken)
+    hints = [Hint(Reason(reason), *rest) for reason, *rest in taken.pop("hints")]
+    return Frame(**taken, hints=hints)
 
 
 class Drive(Iterator[DriveFrame]):

@@ -16,7 +16,7 @@ from ._frame import Engine, _path
 from .errors import InputError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Exposed:
     """What :func:`expose` gives."""
 
@@ -25,8 +25,11 @@ class Exposed:
     work: dict[str, int]
     """What the engine did, and what it left out."""
 
+    def __repr__(self) -> str:
+        return f"<Exposed {_counted(self.histograms)}>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Replayed:
     """What :func:`replay` gives."""
 
@@ -41,8 +44,11 @@ class Replayed:
     cancelled: int
     """Those that cancel in the front end: two of a SPAD between the same two CLK edges."""
 
+    def __repr__(self) -> str:
+        return f"<Replayed {_counted(self.histograms)} of {self.photons} photons>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Ranged:
     """What :func:`range` gives; arrays of shape (rows, cols)."""
 
@@ -65,6 +71,13 @@ class Ranged:
     """-log10 of the chance that light without an echo makes such a peak; NaN where there is no peak."""
     reason: NDArray[np.uint8]
     """A :class:`Reason`: depth, no guide (SPADs are off), saturated, no significant peak, or an echo from behind the lidar."""
+
+    def __repr__(self) -> str:
+        return f"<Ranged: {np.count_nonzero(np.isfinite(self.depth))} depths of {self.depth.size} macropixels>"
+
+
+def _counted(histograms: NDArray[np.uint16]) -> str:
+    return f"{'x'.join(map(str, histograms.shape))}: {histograms.sum(dtype=np.int64)} counts"
 
 
 def expose(

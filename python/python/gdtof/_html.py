@@ -47,5 +47,7 @@ def of_frame(frame: FrameArrays) -> str:
     no_depth = sorted(summary["no_depth"].items(), key=lambda item: -item[1])
     lines += [(f"no depth: {name.replace('_', ' ')}", str(count)) for name, count in no_depth]
     remark = getattr(frame, "remark", None)
-    note = f"<p>{escape(remark)}</p>" if remark else ""
-    return _table(repr(frame).strip("<>").split(",")[0].split(" ")[0], lines) + note
+    sentences = [remark] if remark else []
+    sentences += [hint.sentence for hint in getattr(frame, "hints", [])]
+    notes = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
+    return _table(repr(frame).strip("<>").split(",")[0].split(" ")[0], lines) + notes

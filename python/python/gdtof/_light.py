@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ._arguments import SceneLike, SensorLike, scene_of, sensor_of
 from ._gdtof import Scene, Sensor
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Photons:
     """Pulses of SPADs, what :meth:`Light.photons` gives: arrays of shape (n,), by macropixel, then time."""
 
@@ -27,14 +27,17 @@ class Photons:
     """Column of the macropixel."""
     spad: NDArray[np.uint8]
     """SPAD within the macropixel, row by row."""
-    pixel: NDArray[np.int64] = field(repr=False)
+    pixel: NDArray[np.int64]
     """Macropixel, row-major, as :func:`replay` takes it."""
 
     def __len__(self) -> int:
         return len(self.time_fs)
 
+    def __repr__(self) -> str:
+        return f"<Photons: {len(self)} pulses>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Light:
     """The light of a scene on an array of SPADs, what :func:`light` gives; arrays of shape (rows, cols).
 
@@ -53,9 +56,14 @@ class Light:
     """SPADs of a macropixel."""
     pulse_ns: float
     """How long the wire of a SPAD is high, ns."""
-    _sensor: Sensor = field(repr=False)
-    _scene: Scene = field(repr=False)
-    _asked: tuple[int | None, float | None] = field(repr=False)
+    _sensor: Sensor
+    _scene: Scene
+    _asked: tuple[int | None, float | None]
+
+    def __repr__(self) -> str:
+        rows, cols = self.shape
+        echoes = np.count_nonzero(np.isfinite(self.arrival_ns))
+        return f"<Light of {self._scene.name}, {rows}x{cols} with {self.spads} SPADs each: {echoes} echoes>"
 
     @property
     def shape(self) -> tuple[int, int]:

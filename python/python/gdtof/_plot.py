@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import FrameArrays, Map, Reason, reason_name
-from ._gdtof import DEPTH_COLOURS, PATTERNS, depth_scale_m
+from ._gdtof import DEPTH_COLOURS, PATTERNS
 from .errors import InputError
 
 try:
@@ -77,7 +77,10 @@ def show_figure(figure: Figure, show: bool) -> None:
         plt.close(figure)
 
 
-def plot_maps(frame: FrameArrays, maps: list[Map], title: str | None, show: bool) -> Figure:
+def plot_maps(
+    frame: FrameArrays, maps: list[Map], scale_m: tuple[float, float], title: str | None, show: bool
+) -> Figure:
+    """Maps side by side; distances have the colours of `scale_m`."""
     if not 1 <= len(maps) <= MOST_MAPS:
         raise InputError(f"maps: {len(maps)} maps; give 1 to {MOST_MAPS}")
     rows, cols, _ = frame.shape
@@ -91,7 +94,6 @@ def plot_maps(frame: FrameArrays, maps: list[Map], title: str | None, show: bool
         down, across, figsize=(width * across, height * down + 0.5), squeeze=False, layout="constrained"
     )
     reasons: set[Reason] = set()
-    scale_m = depth_scale_m(frame.depth[np.isfinite(frame.depth)].tolist())
     for at, (name, array) in enumerate(zip(maps, arrays, strict=True)):
         ax = axes[at // across, at % across]
         if name == "reason":

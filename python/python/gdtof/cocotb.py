@@ -7,7 +7,7 @@
 ...     await run_together(laser, spads)
 
 Times are kept in whole steps of the simulator. A driver says at its end by how much rounding moved an edge at most. Needs cocotb 2
-(`pip install "gdtof[cocotb]"`). Tried with Icarus 11; cocotb 2 needs a Verilator later than 5.006, which was not tried.
+(`pip install "gdtof[cocotb]"`). Tried with Icarus 11.0 and with Verilator 5.48; cocotb 2 needs Verilator 5.036 or later.
 """
 
 from __future__ import annotations
@@ -28,6 +28,10 @@ except ImportError as missing:  # pragma: no cover
     raise ImportError('gdtof.cocotb needs cocotb 2; pip install "gdtof[cocotb]"') from missing
 
 __all__ = ["CountMonitor", "Driver", "Laser", "Mismatch", "Scoreboard", "SerialLoad", "SpadPins", "first_edge", "run_together"]
+
+
+def _name(pin: Any) -> str:
+    return str(getattr(pin, "_path", pin))
 
 
 class Driver(Protocol):
@@ -195,7 +199,7 @@ async def first_edge(signal: Any, name: str, *, within_ns: float, rising: bool =
     """
     edge = RisingEdge(signal) if rising else FallingEdge(signal)
     try:
-        await with_timeout(edge, within_ns, "ns")
+        await with_timeout(edge, within_ns, "ns", round_mode="ceil")
     except SimTimeoutError:
         kind = "rise" if rising else "fall"
         raise TimeoutError(f"{name} did not {kind} within {within_ns} ns; is the clock running and the reset off?") from None
@@ -233,11 +237,17 @@ class CountMonitor:
         """
         wanted = int(np.prod(self._shape))
         end = get_sim_time("ns") + within_ns
+        has_risen = False
         while len(self._seen) < wanted:
-            if get_sim_time("ns") > end:
-                name = getattr(self._valid, "_path", "valid")
-                raise TimeoutError(f"{len(self._seen)} of {wanted} counts came within {within_ns} ns; look at {name}")
-            await RisingEdge(self._clk)
+            left = end - get_sim_time("ns")
+            try:
+                if left <= 0:
+                    raise SimTimeoutError
+                await with_timeout(RisingEdge(self._clk), left, "ns", round_mode="ceil")
+                has_risen = True
+            except SimTimeoutError:
+                silent = _name(self._valid) if has_risen else f"{_name(self._clk)}, which did not rise"
+                raise TimeoutError(f"{len(self._seen)} of {wanted} counts came within {within_ns} ns; look at {silent}") from None
         self._task.cancel()
         return np.array(self._seen[:wanted], dtype=np.int64).reshape(self._shape)
 

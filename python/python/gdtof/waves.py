@@ -22,7 +22,7 @@ __all__ = ["Signal", "Waveform", "read_vcd"]
 UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "ps": 1e-12, "fs": 1e-15}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Signal:
     """Changes of a signal."""
 
@@ -34,6 +34,9 @@ class Signal:
     """When it changes, fs, shape (n,)."""
     values: NDArray[Any]
     """What it changes to; -1 where a bit is unknown. Whole numbers, Python's own where they have more than 63 bits. Shape (n,)."""
+
+    def __repr__(self) -> str:
+        return f"<Signal {self.name}, {self.width} bits: {len(self.time_fs)} changes>"
 
     def at(self, time_fs: int) -> int:
         """Its value at a time, -1 where it is unknown."""
@@ -47,7 +50,7 @@ class Signal:
         return times
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Waveform:
     """A waveform: signals by their names."""
 
@@ -70,6 +73,9 @@ class Waveform:
 
     def __len__(self) -> int:
         return len(self.signals)
+
+    def __repr__(self) -> str:
+        return f"<Waveform: {len(self)} signals>"
 
     def plot(
         self,

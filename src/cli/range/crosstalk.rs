@@ -12,7 +12,7 @@ use crate::ranging::Detector;
 /// Photons of the glass in each bin of each zone and capture; no bins in a zone without any.
 ///
 /// # Errors
-/// A file that cannot be read or is of another sensor, a detector of which it cannot be known.
+/// A file that cannot be read or is of another sensor, counts from which it cannot be known.
 pub(super) fn light(
     args: &RangeArgs,
     (source, format): (&Path, HistogramFormat),
@@ -21,10 +21,6 @@ pub(super) fn light(
 ) -> Result<Vec<Vec<f64>>, InputError> {
     // The pulse leaves at nearly the same time in all captures.
     let detector = &detectors[0];
-    if detector.coincidence.is_some() {
-        let message = "is not known from SPADs that fire together; leave it out";
-        return Err(InputError::new("--crosstalk", message));
-    }
     let is_fit = source.as_os_str() == "fit";
     let measured = if is_fit {
         None
@@ -59,11 +55,18 @@ pub(super) fn light(
             bins.for_each(|(sum, &count)| *sum = sum.saturating_add(count));
         }
         let number = captures.captures.len() as u32;
-        if is_fit {
+        let light = if is_fit {
             detector.fitted_crosstalk(&sums, number)
         } else {
             detector.measured_crosstalk(&sums, number)
-        }
+        };
+        light.map_err(|error| {
+            let file = if is_fit { &args.histograms } else { source };
+            let message = format!("zone {zone} {error}; correct pulse_fwhm_ns and start_ns, or leave the bins of the glass out with --bins");
+            InputError::new(file.display(), message)
+        })
     };
-    Ok((0..captures.zones()).into_par_iter().map(of_zone).collect())
+    let zones = (0..captures.zones()).into_par_iter().map(of_zone);
+    // The first zone of which there is something to say, whichever ends first.
+    zones.collect::<Vec<_>>().into_iter().collect()
 }

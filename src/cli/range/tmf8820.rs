@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::args::{Fit, RangeArgs};
 use super::returns::number_text;
 use crate::cli::voice::{say_json, say_unless_quiet};
-use crate::files::{InputError, OutputFile, parse_json, read_text};
+use crate::files::{InputError, OutputFile, other_kind, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, ZoneEcho, arrival};
 use crate::report::Grid;
@@ -208,7 +208,8 @@ struct Report {
 /// Bad input, files that cannot be written.
 pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     let fit = args.fit.unwrap_or(Fit::Even);
-    let captures = tmf8820::read(&args.histograms)?;
+    let name_kind = |error| other_kind(&args.histograms, "tmf8820").unwrap_or(error);
+    let captures = tmf8820::read(&args.histograms).map_err(name_kind)?;
     let zones = captures[0].hists.len();
     let without_truth = captures
         .iter()

@@ -39,7 +39,7 @@ pub use femtogate::{InputError, in_words, instead_of, nearest};
 pub use guarded::{
     begins_with, guard_inputs, open_input, refuse_input, said_of_kept_files, set_aside_foreign,
 };
-pub use histograms::{HistogramFormat, ZoneCounts, ZoneHistograms};
+pub use histograms::{HistogramFormat, ZoneCounts, ZoneHistograms, other_kind};
 pub use input::Lines;
 pub(crate) use input::MOST_TOML_BYTES;
 pub use input::{

@@ -25,6 +25,7 @@ use super::finder::{DepthOptions, EchoFinder};
 use super::peak::median;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
+pub use crosstalk::UnknownCrosstalk;
 pub use description::{BadDetector, DescribedCoincidence, DetectorDescription};
 pub use mean::{Agreement, SurfaceLight};
 
@@ -70,7 +71,7 @@ pub struct Detector {
     pub coincidence: Option<Coincidence>,
     /// Counts at which a bin stops.
     pub most_counts: Option<u32>,
-    /// Photons that come to each bin in all laser cycles without a target, as from a cover glass; empty without any.
+    /// Photons, not events, that come to each bin in all laser cycles without a target, as from a cover glass; empty without any.
     pub crosstalk: Vec<f64>,
 }
 

@@ -23,7 +23,7 @@ pub use arrival::{ArrivalOptions, arrival};
 pub use calibration::{Calibration, CalibrationError, ZoneCalibration, ZoneEcho};
 pub use detector::{
     Agreement, BadDetector, Coincidence, CountedEvents, DescribedCoincidence, DetectedReturn,
-    Detector, DetectorDescription, NoReturn, SurfaceLight, TooManyCounts,
+    Detector, DetectorDescription, NoReturn, SurfaceLight, TooManyCounts, UnknownCrosstalk,
 };
 pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};

@@ -128,7 +128,7 @@ mod tests {
                 .contains(":1: has no zone")
         );
         assert!(
-            read("1,2,3\n", Some(1.0))
+            read("none\n", Some(1.0))
                 .unwrap_err()
                 .contains("lines `Agg")
         );

@@ -8,6 +8,7 @@
 //! | CNH | `cnh.rs`: lines `Agg, zone, …` of compact normalised histograms of VL53L5, VL53L7 and VL53L8 sensors |
 
 mod cnh;
+mod kind;
 mod npz;
 mod table;
 mod tmf8829;
@@ -17,6 +18,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use femtogate::InputError;
+
+pub use kind::other_kind;
 
 /// Most bins of a histogram.
 const MOST_BINS: usize = 1 << 16;
@@ -67,12 +70,14 @@ impl ZoneHistograms {
         counts_per_unit: Option<f64>,
     ) -> Result<Self, InputError> {
         let found = match format {
-            HistogramFormat::Table => table::read(path, counts_per_unit)?,
-            HistogramFormat::Tmf882x => tmf882x::read(path)?,
-            HistogramFormat::Tmf8829 => tmf8829::read(path)?,
-            HistogramFormat::Cnh => cnh::read(path, counts_per_unit)?,
+            HistogramFormat::Table => table::read(path, counts_per_unit),
+            HistogramFormat::Tmf882x => tmf882x::read(path),
+            HistogramFormat::Tmf8829 => tmf8829::read(path),
+            HistogramFormat::Cnh => cnh::read(path, counts_per_unit),
         };
-        let complain = |message: String| Err(InputError::new(path.display(), message));
+        let name_kind = |error| other_kind(path, format.name()).unwrap_or(error);
+        let found = found.map_err(name_kind)?;
+        let complain = |message: String| Err(name_kind(InputError::new(path.display(), message)));
         if found
             .captures
             .iter()
@@ -112,6 +117,16 @@ impl ZoneHistograms {
 }
 
 impl HistogramFormat {
+    /// Its name on the command line.
+    fn name(self) -> &'static str {
+        match self {
+            HistogramFormat::Table => "counts",
+            HistogramFormat::Tmf882x => "tmf882x",
+            HistogramFormat::Tmf8829 => "tmf8829",
+            HistogramFormat::Cnh => "cnh",
+        }
+    }
+
     /// What to give, for complaints.
     fn wanted(self) -> &'static str {
         match self {

@@ -8,8 +8,11 @@
 //!
 //! What is known so goes into the mean histogram beside echo and background. An echo has the noise of three numbers, and bins have that of each.
 //! So light that is no echo of the pulse must be measured for much longer than the captures that it is used for.
+//!
+//! SPADs that fire together count light by about the power of their number, and the light before it matters, too. The light of an echo follows
+//! from their counts, and that of single bins does not.
 
-use super::{CountedEvents, DetectedReturn, Detector, SurfaceLight};
+use super::{CountedEvents, DetectedReturn, Detector, NoReturn, SurfaceLight};
 use crate::ranging::DepthOptions;
 use crate::ranging::peak::median;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -17,13 +20,35 @@ use crate::units::SPEED_OF_LIGHT_M_PER_S;
 /// Standard deviations by which a bin must exceed the background.
 const STANDS_OUT: f64 = 3.0;
 
+/// Counts of SPADs that fire together from which the light of a glass does not follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "has counts of SPADs that fire together which are no echo of a pulse this wide, so that the photons of the glass are not known"
+)]
+pub struct UnknownCrosstalk;
+
 impl Detector {
     /// Photons of the glass in each bin of a histogram, from `sums`, the counts of all `histograms` without a
     /// target; empty without any light.
-    pub fn measured_crosstalk(&self, sums: &[u32], histograms: u32) -> Vec<f64> {
-        let returns = self.returns_of_sum(sums, histograms);
+    ///
+    /// # Errors
+    /// SPADs that fire together, and counts that are not echoes of the pulse.
+    pub fn measured_crosstalk(
+        &self,
+        sums: &[u32],
+        histograms: u32,
+    ) -> Result<Vec<f64>, UnknownCrosstalk> {
+        let returns = match self.returns_of_sum(sums, histograms) {
+            Err(NoReturn::NoSignificantPeak) if self.coincidence.is_some() => {
+                return Ok(Vec::new());
+            }
+            returns => returns.unwrap_or_default(),
+        };
         if !returns.is_empty() && returns.iter().all(|found| found.bound_m.is_some()) {
-            return self.mean_of(&returns, histograms);
+            return Ok(self.mean_of(&returns, histograms));
+        }
+        if self.coincidence.is_some() {
+            return Err(UnknownCrosstalk);
         }
         let number = f64::from(histograms.max(1));
         let cycles = self.laser_cycles.map(|cycles| number * f64::from(cycles));
@@ -55,35 +80,51 @@ impl Detector {
         };
         let glass: Vec<f64> = photons.iter().enumerate().map(above).collect();
         if glass.iter().any(|&photons| photons > 0.0) {
-            glass
+            Ok(glass)
         } else {
-            Vec::new()
+            Ok(Vec::new())
         }
     }
 
     /// The same of the echoes in the sum of some histograms that are no farther away than the width of a pulse or a bin; empty where there are
     /// none.
-    pub fn fitted_crosstalk(&self, sums: &[u32], histograms: u32) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// SPADs that fire together, and a near echo of another form than the pulse.
+    pub fn fitted_crosstalk(
+        &self,
+        sums: &[u32],
+        histograms: u32,
+    ) -> Result<Vec<f64>, UnknownCrosstalk> {
         let reach_s = (2.0 * self.pulse_sigma_s).max(self.bin_s());
         let reach_m = 0.5 * SPEED_OF_LIGHT_M_PER_S * reach_s;
-        let mut returns = self.returns_of_sum(sums, histograms);
+        let mut returns = match self.returns_of_sum(sums, histograms) {
+            Err(NoReturn::Saturated) if self.coincidence.is_some() => return Err(UnknownCrosstalk),
+            returns => returns.unwrap_or_default(),
+        };
         returns.retain(|found| found.depth_m.abs() <= reach_m);
         if returns.is_empty() {
-            return Vec::new();
+            return Ok(Vec::new());
         }
-        self.mean_of(&returns, histograms)
+        if self.coincidence.is_some() && returns.iter().any(|found| found.bound_m.is_none()) {
+            return Err(UnknownCrosstalk);
+        }
+        Ok(self.mean_of(&returns, histograms))
     }
 
     /// The echoes in the sum of some histograms.
-    fn returns_of_sum(&self, sums: &[u32], histograms: u32) -> Vec<DetectedReturn> {
+    fn returns_of_sum(
+        &self,
+        sums: &[u32],
+        histograms: u32,
+    ) -> Result<Vec<DetectedReturn>, NoReturn> {
         let cycles = |cycles: u32| cycles.saturating_mul(histograms.max(1));
         let of_sum = Detector {
             laser_cycles: self.laser_cycles.map(cycles),
             most_counts: None,
             ..self.clone()
         };
-        let returns = of_sum.returns(sums, &DepthOptions::default());
-        returns.unwrap_or_default()
+        of_sum.returns(sums, &DepthOptions::default())
     }
 
     /// Photons in each bin of one histogram, if the sum of all has these echoes.
@@ -95,6 +136,8 @@ impl Detector {
             let widened = Detector {
                 pulse_sigma_s: libm::hypot(self.pulse_sigma_s, spread_s),
                 counted: CountedEvents::Every,
+                coincidence: None,
+                most_counts: None,
                 ..self.clone()
             };
             let mean = widened.expected(&SurfaceLight {
