@@ -28,7 +28,8 @@ if times := os.environ.get("PROCESSOR_TIMES"):
 
 ROOT = Path(__file__).parent.parent
 MANIFESTS = {name: ROOT / path / "Cargo.toml" for name, path in
-             {"gates": "crates/gates", "light": "crates/light", "scene": "crates/scene", "sensor": "crates/sensor", "src": "."}.items()}
+             {"gates": "crates/gates", "light": "crates/light", "scene": "crates/scene", "sensor": "crates/sensor",
+              "lidar": "crates/lidar", "thesis": "crates/thesis", "src": "."}.items()}
 
 metadata = json.loads(subprocess.run(["cargo", "metadata", "--format-version=1", "--locked", "--filter-platform",
                                       "x86_64-unknown-linux-gnu"], cwd=ROOT, capture_output=True, check=True).stdout)

@@ -1,5 +1,5 @@
 //! What a macropixel costs on the window engine and on the cohort engine in ever more light, beside the prices with which
-//! `gdtof frame --tolerance` chooses between them (`src/system/price.rs`).
+//! `gdtof frame --tolerance` chooses between them (`crates/lidar/src/system/price.rs`).
 //!
 //! `cargo bench --bench prices` prints a line a light: processor time of one thread in microseconds a macropixel, the least
 //! of some runs of some macropixels; `cohort` is its bound on the depth error and its histogram.

@@ -1,4 +1,4 @@
-//! The readers of `guided_dtof::cli::READERS` under libFuzzer; the environment variable `READER` names one. `fuzz/run` builds and runs it.
+//! The readers of `gdtof::cli::READERS` under libFuzzer; the environment variable `READER` names one. `fuzz/run` builds and runs it.
 
 #![no_main]
 
@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use cap::Cap;
 use cpu_time::ThreadTime;
-use guided_dtof::cli::{READERS, Reader};
+use gdtof::cli::{READERS, Reader};
 use libfuzzer_sys::fuzz_target;
 
 /// What takes more than 200 MB at once is a crash.

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    guided_dtof::cli::main()
+    gdtof::cli::main()
 }

@@ -1,5 +1,5 @@
 //! The same as `gdtof tb tb_p_counter_variants`.
 
 fn main() -> std::process::ExitCode {
-    guided_dtof::cli::testbench(env!("CARGO_BIN_NAME"))
+    gdtof::cli::testbench(env!("CARGO_BIN_NAME"))
 }

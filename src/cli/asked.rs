@@ -38,15 +38,14 @@ pub(super) struct ExposureArgs {
 impl ExposureArgs {
     /// The request with these options, and defaults for everything else.
     pub(super) fn request(&self) -> FrameRequest {
-        self.guiding.add_to(FrameRequest {
-            stop_periods: self.stop_periods,
-            laser_cycles: self.laser_cycles,
-            seed: self.seed,
-            engine: self.engine,
-            calibration: self.calibration.clone(),
-            spelling: Spelling::Options,
-            ..FrameRequest::default()
-        })
+        let mut request = self.guiding.add_to(FrameRequest::default());
+        request.stop_periods = self.stop_periods;
+        request.laser_cycles = self.laser_cycles;
+        request.seed = self.seed;
+        request.engine = self.engine;
+        request.calibration = self.calibration.clone();
+        request.spelling = Spelling::Options;
+        request
     }
 }
 
@@ -145,13 +144,11 @@ pub(super) struct GuideArgs {
 
 impl GuideArgs {
     /// Adds guide and windows to a request.
-    pub(super) fn add_to(&self, request: FrameRequest) -> FrameRequest {
-        FrameRequest {
-            guides: self.guides.clone(),
-            windows: self.windows.clone().unwrap_or_default(),
-            bins_from_guide: self.bins_from_guide,
-            ..request
-        }
+    pub(super) fn add_to(&self, mut request: FrameRequest) -> FrameRequest {
+        request.guides = self.guides.clone();
+        request.windows = self.windows.clone().unwrap_or_default();
+        request.bins_from_guide = self.bins_from_guide;
+        request
     }
 }
 

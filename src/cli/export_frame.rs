@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::voice::{notes, say_unless_quiet};
 use crate::files::{InputError, ResultSet, read_counts};
 use crate::report::{Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
-use crate::system::{DepthReturn, NoDepth, PixelDepth, RETURNS, TakenFrame, cloud};
+use crate::system::{DepthReturn, NoDepth, PixelDepth, RETURNS, TakenFrame, point_cloud};
 
 /// Arguments of `gdtof export frame`.
 #[derive(Args)]
@@ -62,7 +62,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let histograms = read_counts(&args.frame.join("histograms.npy"), &shape)?;
 
     let camera = settings.scene.lidar_camera(rows as u32, cols as u32);
-    let points = cloud(&camera, cols, &pixels);
+    let points = point_cloud(&camera, cols, &pixels);
     let depths = pixel_values(&pixels, |pixel| pixel.measured_m);
 
     let results = ResultSet::begin(&args.out, "export frame")?;

@@ -6,9 +6,9 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::files::{InputError, OutputFile, open_file};
-use crate::report::{Channel, CloudPoint, FLOATS, Mcap, SHORTS};
+use crate::report::{Channel, CloudPoint, Mcap};
 use crate::scene::{DVec3, PinholeCamera};
-use crate::system::{DriveFrame, DriveSettings, cloud};
+use crate::system::{DriveFrame, DriveSettings, point_cloud};
 
 const TRANSFORM: usize = 0;
 const POINTS: usize = 1;
@@ -86,14 +86,14 @@ impl Foxglove {
             "translation": xyz(DVec3::ZERO),
             "rotation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5},
         });
-        let fields = FLOATS.iter().enumerate();
+        let fields = CloudPoint::FLOATS.iter().enumerate();
         let fields = fields
             .map(|(number, name)| json!({"name": name, "offset": 4 * number, "type": FLOAT32}));
-        let shorts = SHORTS.iter().enumerate();
+        let shorts = CloudPoint::SHORTS.iter().enumerate();
         let shorts = shorts.map(|(number, name)| {
-            json!({"name": name, "offset": 4 * FLOATS.len() + 2 * number, "type": UINT16})
+            json!({"name": name, "offset": 4 * CloudPoint::FLOATS.len() + 2 * number, "type": UINT16})
         });
-        let points = cloud(&self.camera, self.cols, &frame.pixels);
+        let points = point_cloud(&self.camera, self.cols, &frame.pixels);
         let points: Vec<u8> = points.iter().flat_map(CloudPoint::bytes).collect();
         let points = json!({
             "timestamp": time, "frame_id": "lidar", "pose": pose(),

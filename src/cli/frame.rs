@@ -164,13 +164,12 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
 
 impl FrameArgs {
     fn request(&self) -> FrameRequest {
-        FrameRequest {
-            tolerance_m: self.tolerance,
-            skip: !self.no_skip,
-            false_alarm_rate: self.false_alarm_rate,
-            correct_walk: !self.no_walk_correction,
-            ..self.exposure.request()
-        }
+        let mut request = self.exposure.request();
+        request.tolerance_m = self.tolerance;
+        request.skip = !self.no_skip;
+        request.false_alarm_rate = self.false_alarm_rate;
+        request.correct_walk = !self.no_walk_correction;
+        request
     }
 }
 

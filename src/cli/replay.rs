@@ -360,12 +360,7 @@ fn replay(
     let Some(silicon) = silicon else {
         return run_engine(stimuli, &*kind.replay(sensor, exposure)?);
     };
-    let runner = match kind {
-        EngineKind::Gate => Runner::Gate,
-        EngineKind::Cycle => Runner::Cycle,
-        EngineKind::Window => Runner::Window,
-        EngineKind::Cohort => return Err(EngineError::NoPhotons.into()),
-    };
+    let runner = kind.runner()?;
     let timed = Timed::new(sensor.made_of(silicon), exposure, runner);
     let replayed = run_engine(stimuli, &timed)?;
     Ok(ReplayResult {

@@ -265,11 +265,9 @@ fn outcome_table(study: &Study, outcome: &Outcome, seconds: f64) -> Table {
     }
     if outcome.taken > 0 {
         table.push("run time", format!("{seconds:.1} s"));
-        let each = match study.kind {
-            StudyKind::Frame => format!("{:.1} /s", outcome.taken as f64 / seconds),
-            StudyKind::Theory => format!("{:.0} /s", outcome.taken as f64 / seconds),
-        };
-        table.push("points taken", each);
+        let digits = usize::from(study.kind == StudyKind::Frame);
+        let rate_hz = outcome.taken as f64 / seconds;
+        table.push("points taken", format!("{rate_hz:.digits$} /s"));
     }
     table
 }

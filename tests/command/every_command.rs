@@ -135,7 +135,7 @@ pub fn commands() -> Vec<(String, Vec<Arg>)> {
             add(child, path.trim(), to);
         }
     }
-    let mut program = guided_dtof::cli::command_line();
+    let mut program = gdtof::cli::command_line();
     program.build();
     let mut commands = Vec::new();
     for child in program.get_subcommands().filter(|c| c.get_name() != "help") {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use cpu_time::ThreadTime;
-use guided_dtof::cli::READERS;
+use gdtof::cli::READERS;
 
 #[test]
 fn every_kept_input_is_read_or_refused() {

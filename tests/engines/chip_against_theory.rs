@@ -5,11 +5,11 @@
 use std::f64::consts::PI;
 
 use guided_dtof::numerics::intervals::Estimate;
-use guided_dtof::reproduce::measured::detection::{attributions, detected};
-use guided_dtof::reproduce::measured::precision::{Estimator, by_formula, scatter};
-use guided_dtof::reproduce::measured::{Effect, Trial};
 use guided_dtof::theory::cycles::laser_cycles_for;
 use guided_dtof::theory::detection::{DetectionModel, Ties, probability};
+use guided_dtof_thesis::reproduce::measured::detection::{attributions, detected};
+use guided_dtof_thesis::reproduce::measured::precision::{Estimator, by_formula, scatter};
+use guided_dtof_thesis::reproduce::measured::{Effect, Trial};
 
 const EQ_17: DetectionModel = DetectionModel::Poisson(Ties::Random);
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use guided_dtof::reproduce::{
+use guided_dtof_thesis::reproduce::{
     ClaimRow, Report, Selection, Verdict, html, markdown, overall, reproduce, tally,
 };
 

@@ -7,7 +7,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use guided_dtof::reproduce::{ClaimResult, ClaimRow, Report, between_quotes};
+use guided_dtof_thesis::reproduce::{ClaimResult, ClaimRow, Report, between_quotes};
 
 use super::published_figures_are_met::claims;
 

@@ -165,9 +165,11 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         for folder in [
             "src",
+            "crates/lidar/src",
             "crates/light/src",
             "crates/scene/src",
             "crates/sensor/src",
+            "crates/thesis/src",
         ] {
             users(&root.join(folder), &mut found);
         }
