@@ -67,7 +67,7 @@ fn a_probe_names_the_engine_it_is_compared_with() {
         let small = "frame --rows 4 --cols 4 --laser-cycles 2 --set scene.lidar.pde=0.02";
         let small: Vec<&str> = small.split(' ').collect();
         let table = gdtof(here.path(), &[&small[..], &choice].concat());
-        let said = format!("agree with {compared_with} in 2 laser cycles");
+        let said = format!("agree with the engine {compared_with} in 2 laser cycles");
         assert!(table.contains(&said), "{choice:?}: {table}");
     }
 }

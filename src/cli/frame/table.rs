@@ -93,7 +93,8 @@ fn timing_of(settings: &FrameSettings, timing: &VerdictReport) -> String {
 fn probes(table: &mut Table, args: &FrameArgs, frame: &Frame) {
     for ((row, col), cycles) in frame.probes.iter().zip(&frame.probed_cycles) {
         let engine = args.exposure.engine.of_probes(frame.kept.is_some());
-        let agree = format!("agree with {engine:?} in {cycles} laser cycles").to_lowercase();
+        let agree =
+            format!("agree with the engine {engine:?} in {cycles} laser cycles").to_lowercase();
         table.push(format!("gates of macropixel ({row}, {col})"), agree);
     }
 }
