@@ -21,7 +21,8 @@ use crate::units::Time;
 
 words_of_settings! {
     /// What pulses are written as.
-    #[derive(Default, clap::ValueEnum)]
+    #[derive(Default)]
+    #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
     pub enum PulseFormat {
         /// photons.csv: `time_fs,row,col,spad`, which `gdtof replay` reads.
         #[default]

@@ -15,7 +15,8 @@ use crate::settings::words;
 
 words! {
     /// Which engine runs the macropixels that are not probed.
-    #[derive(Default, clap::ValueEnum)]
+    #[derive(Default)]
+    #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
     #[non_exhaustive]
     pub enum EngineKind {
         /// Event-driven simulation of the netlist with its delays.

@@ -6,7 +6,8 @@ use crate::system::policy::WindowPolicy;
 use crate::system::settings::FrameSettings;
 
 /// Where the photons of a frame come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Noise {

@@ -117,7 +117,7 @@ pub(super) fn hidden_state(module: &Arc<Module>, expected: CountDownSetup) -> Op
         {
             return Some(format!(
                 "keeps state from one laser cycle to the next in {}, on which LOCAL_STOP depends; \
-                 set or clear it while COUNTER_RESET is high",
+                 set or clear it while COUNTER_RESET is high, without an edge of COUNTER_CLK",
                 counter.name(cell)
             ));
         }
