@@ -144,7 +144,7 @@ fn answer(
     let rest = match highest {
         None => "at every CLK down to a sixteenth of it, too".to_owned(),
         Some(HighestClock { clk_hz, limit }) => {
-            let up_to = format!("the highest CLK is {:.1} MHz", clk_hz * 1e-6);
+            let up_to = format!("it works up to {:.1} MHz", clk_hz / 1e6);
             match limit {
                 Some(limit) => format!("{up_to}, limited by {} ({})", limit.check, limit.path),
                 None => format!("{up_to} or more"),
