@@ -255,11 +255,6 @@ fn a_wrong_description_is_said_in_a_sentence() {
             " --crosstalk one.csv",
             "one.csv: has 1 zones",
         ),
-        (
-            description("coincidence = { spads = 2, within_ns = 4, of = 16 }\nlaser_cycles = 3\n"),
-            " --crosstalk fit",
-            "--crosstalk: is not known",
-        ),
     ] {
         std::fs::write(folder.join("d.toml"), text).unwrap();
         let refused = gdtof_words(folder, &format!("{words}{more}"));

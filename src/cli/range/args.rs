@@ -68,7 +68,7 @@ pub(in crate::cli) struct RangeArgs {
     #[arg(long, value_name = "FILE")]
     pub(super) frame: Option<PathBuf>,
     /// Description of the detector (TOML) with the keys bin_width_ns or bin_edges_ns, start_ns, pulse_fwhm_ns, counts, laser_cycles,
-    /// most_counts and coincidence; for all formats but frame and tmf8820, as the next eight options, which go before it.
+    /// most_counts and coincidence; for all formats but frame and tmf8820, as the next eight options, which replace what it says.
     #[arg(long, value_name = "FILE")]
     pub(super) detector: Option<PathBuf>,
     /// Length of a bin, ns.

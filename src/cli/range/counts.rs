@@ -16,6 +16,7 @@ use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
 use crate::system::median;
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Counts that two histograms do not share by chance.
 const TOO_MANY_FOR_CHANCE: u64 = 200;
@@ -107,7 +108,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
     if args.json {
         return say_json(&serde_json::json!({ "zones": zones }));
     }
-    let mut table = table(args, &zones);
+    let mut table = table(args, detectors.first(), &zones);
     if args.crosstalk.is_some() {
         let lit = glass.iter().filter(|light| !light.is_empty()).count();
         let row = format!("{lit} of {}", glass.len());
@@ -195,10 +196,19 @@ fn bins(text: &str) -> Result<Range<usize>, InputError> {
     }
 }
 
-fn table(args: &RangeArgs, zones: &[Zone]) -> Table {
+fn table(args: &RangeArgs, detector: Option<&Detector>, zones: &[Zone]) -> Table {
     let mut table = Table::new(format!("Depths of {}", args.histograms.display()));
     let all = zones.len();
     let firsts: Vec<&DetectedReturn> = zones.iter().filter_map(|z| z.returns.first()).collect();
+    if let Some(detector) = detector {
+        let ends_s = [detector.edges_s[0], detector.edges_s[detector.bins()]];
+        let [from_m, until_m] = ends_s.map(|s| 0.5 * SPEED_OF_LIGHT_M_PER_S * s);
+        let bins = detector.bins();
+        table.push(
+            "bins of a zone",
+            format!("{bins}, from {from_m:.2} to {until_m:.2} m"),
+        );
+    }
     let captures = zones.last().map_or(0, |zone| 1 + zone.capture);
     if captures > 1 {
         table.push("captures", captures.to_string());

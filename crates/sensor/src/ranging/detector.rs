@@ -330,16 +330,25 @@ fn dark_counts(law: &OtherBins, response: &Response, counts: &[u32], all_parts: 
         open
     });
     let open: Vec<f64> = open.collect();
-    let background = |(bin, &count): (usize, &u32)| {
+    let chances = |(bin, &count): (usize, &u32)| {
         let length = law.edges[bin + 1] - law.edges[bin];
-        let known = law.known.get(bin).map_or(0.0, |known| known / law.parts);
-        let chance = f64::from(count) / (open[bin] * law.parts);
-        (law.steady_light(chance / length) - known / length).max(0.0)
+        let known = law.known.get(bin).map_or(0.0, |known| known / law.parts) / length;
+        let chance = f64::from(count) / (open[bin] * law.parts) / length;
+        (chance, known)
     };
-    let levels: Vec<f64> = counts.iter().enumerate().map(background).collect();
+    let chances = counts.iter().enumerate().map(chances);
+    let level = if law.together.is_some() {
+        // Known light and background make coincidences together, so that bins with known light do not tell the background.
+        let of_a_count = law.steady_light(f64::from(all_parts).recip());
+        let dark = chances.filter(|(_, known)| *known < of_a_count);
+        law.steady_light(middle_mean(dark.map(|(chance, _)| chance).collect()))
+    } else {
+        let levels = chances.map(|(chance, known)| (law.steady_light(chance) - known).max(0.0));
+        median(levels.collect::<Vec<f64>>().iter())
+    };
     // Half a count in all bins at least, so that none is impossible.
     let least = law.steady_light(0.5 / (counts.len() as f64 * f64::from(all_parts)));
-    let dark = law.dark_events(response, median(levels.iter()).max(least));
+    let dark = law.dark_events(response, level.max(least));
     let counted = |(open, events): (&f64, f64)| {
         if law.first_only {
             open * -libm::expm1(-events)
@@ -348,6 +357,14 @@ fn dark_counts(law: &OtherBins, response: &Response, counts: &[u32], all_parts: 
         }
     };
     open.iter().zip(dark).map(counted).collect()
+}
+
+/// The mean of the middle half, 0 of none: a median of small counts is one of few numbers.
+fn middle_mean(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let quarter = values.len() / 4;
+    let middle = &values[quarter..values.len() - quarter];
+    middle.iter().sum::<f64>() / middle.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -35,10 +35,13 @@ pub fn other_kind(path: &Path, wanted: &str) -> Option<InputError> {
         (!is_read).then(|| "is packed by gzip; unpack it with gunzip".to_owned())
     } else if first.starts_with(b"\x93NUMPY") {
         let is_read = wanted == "counts" && is_named("npy");
-        (!is_read).then(|| {
-            "is an array of NumPy, which --format counts reads if its name ends with .npy"
-                .to_owned()
-        })
+        let cure = if wanted == "counts" {
+            "give it such a name".to_owned()
+        } else {
+            other_format(wanted)
+        };
+        let what = "is an array of NumPy, which --format counts reads if its name ends with .npy";
+        (!is_read).then(|| format!("{what}; {cure}"))
     } else if first.starts_with(b"\x89PNG") {
         Some("is a picture; give counts".to_owned())
     } else if is_named("npz") {
@@ -48,9 +51,15 @@ pub fn other_kind(path: &Path, wanted: &str) -> Option<InputError> {
     } else {
         let text = String::from_utf8_lossy(&first);
         let (kind, format) = kind_of_text(&text)?;
-        (format != wanted).then(|| format!("is {kind}, which --format {format} reads"))
+        let cure = other_format(wanted);
+        (format != wanted).then(|| format!("is {kind}, which --format {format} reads; {cure}"))
     };
     Some(InputError::new(path.display(), message?))
+}
+
+/// What to do with a file that another format reads.
+fn other_format(wanted: &str) -> String {
+    format!("give that format, or a file of --format {wanted}")
 }
 
 fn of_python(path: &Path, kind: &str) -> String {

@@ -56,6 +56,11 @@ fn read_lines(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u
         let is_heading = is_first && cells.iter().all(|cell| cell.parse::<f64>().is_err());
         is_first = false;
         if is_heading {
+            if let Some(word) = cells.iter().find(|cell| names_no_bin(cell)) {
+                return Err(complain(format!(
+                    "has a column {word}, which is no bin; leave that column out"
+                )));
+            }
             continue;
         }
         if bins == 0 {
@@ -80,6 +85,27 @@ fn read_lines(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u
         }
     }
     Ok((bins, counts))
+}
+
+/// Whether a heading says that its column has something else than counts of a bin.
+fn names_no_bin(heading: &str) -> bool {
+    let word = heading.trim_matches('"').to_lowercase();
+    matches!(
+        &*word,
+        "zone"
+            | "pixel"
+            | "id"
+            | "index"
+            | "row"
+            | "col"
+            | "column"
+            | "x"
+            | "y"
+            | "name"
+            | "time"
+            | "timestamp"
+            | "frame"
+    )
 }
 
 /// The cells of a line. A spreadsheet's comma at the end of a line, or its `1;2` with spaces beside, makes no cell.

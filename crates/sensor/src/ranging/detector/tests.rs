@@ -205,6 +205,27 @@ fn depths_of_spads_that_fire_together_keep_their_bounds() {
     }
 }
 
+/// Outputs that are high for a time as short as the pulse: some light is so strong under it that more of it makes fewer events.
+#[test]
+fn depths_of_spads_with_short_outputs_have_a_bound_that_they_keep() {
+    for within_s in [1e-9, 2e-9] {
+        let coincidence = Coincidence {
+            spads: 2,
+            within_s,
+            lit_spads: 16,
+        };
+        let detector = Detector {
+            coincidence: Some(coincidence),
+            ..detector(CountedEvents::Every)
+        };
+        for signal in [0.5, 0.7, 1.0, 1.5] {
+            for background in [0.0, 1.0, 4.0] {
+                assert_within_bounds(&detector, 7, &Light::new(45e-9, signal, background));
+            }
+        }
+    }
+}
+
 #[test]
 fn a_surface_beside_a_cover_glass_keeps_its_bound() {
     for counted in [CountedEvents::Every, CountedEvents::First] {

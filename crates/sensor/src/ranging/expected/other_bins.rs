@@ -83,22 +83,14 @@ impl OtherBins {
         let Some(together) = self.together else {
             return events / self.parts;
         };
-        // Events grow with light as long as few SPADs have had a photon.
+        // Events grow with light until so many SPADs are high that none is missing; the light before that is told.
         let rate = |photons: f64| {
-            let window = Dual::<0>::constant(photons * together.within_bins);
-            photons * together.completes(window, self.first_only).value
+            let photons = Dual::<1>::parameter(photons, 0);
+            photons * together.completes(photons * together.within_bins, self.first_only)
         };
-        let most = f64::from(together.of_spads) / together.within_bins;
-        let (mut least, mut most) = (0.0, most);
-        for _ in 0..50 {
-            let middle = 0.5 * (least + most);
-            if rate(middle) < events {
-                least = middle;
-            } else {
-                most = middle;
-            }
-        }
-        least / self.parts
+        let all_high = 4.0 * f64::from(together.of_spads) / together.within_bins;
+        let most = last_below(all_high, |photons| rate(photons).slope[0] > 0.0);
+        last_below(most, |photons| rate(photons).value < events) / self.parts
     }
 
     /// The chance of every bin, with its slopes with the first K parameters.
@@ -248,6 +240,20 @@ impl OtherBins {
         let cubed = begins + ends - 2.0 * gain;
         sums[bin] + share * (begins + share * (squared + share * cubed))
     }
+}
+
+/// Where something ends to be so that is so from 0 on, below `most`.
+fn last_below(most: f64, is_so: impl Fn(f64) -> bool) -> f64 {
+    let (mut least, mut most) = (0.0, most);
+    for _ in 0..50 {
+        let middle = 0.5 * (least + most);
+        if is_so(middle) {
+            least = middle;
+        } else {
+            most = middle;
+        }
+    }
+    least
 }
 
 impl FiringTogether {
