@@ -47,6 +47,25 @@ fn a_skewed_column_counts_alike_with_and_without_a_waveform() {
 }
 
 #[test]
+fn what_counts_nothing_says_where_windows_are() {
+    // Nanoseconds in the place of femtoseconds.
+    let folder = folder("0,0,100\n", "250,0,0,0\n");
+    let said = |more: &str| {
+        let chip = "--rows 1 --cols 1 --laser-cycles 2";
+        let (counts, said) = replay(folder.path(), &format!("{chip} {more}"));
+        assert!(counts.is_empty(), "{counts:?}");
+        said
+    };
+    for engine in ["gate", "window"] {
+        let never = said(&format!("--stop-periods 80 --engine {engine}"));
+        assert!(never.contains("opens a window within 80 CLK"), "{never}");
+        let elsewhere = said(&format!("--stop-periods 200 --engine {engine}"));
+        let where_it_is = "start value 100 is from 217.";
+        assert!(elsewhere.contains(where_it_is), "{elsewhere}");
+    }
+}
+
+#[test]
 fn checks_are_those_of_the_silicon() {
     // In every other CLK period of the window, so that the shift register changes when it is strobed.
     let photons = (0..20).map(|k| format!("{},0,0,{}\n", 30_000_000 + 5_208_333 * k, k % 16));

@@ -3,24 +3,27 @@
 use std::ops::Range;
 
 use super::stimuli::Stimuli;
-use crate::chip::WindowLaw;
+use crate::chip::{WindowLaw, WindowOutcome};
 use crate::units::Time;
 
 /// One sentence for a recording of `events` SPAD pulses that left every bin empty.
 pub(super) fn sentence(stimuli: &Stimuli, events: u64) -> String {
     let law = WindowLaw::new(stimuli.sensor.clone(), &stimuli.exposure);
-    let first = (stimuli.starts.iter()).find_map(|&start| law.window(start).open());
+    let outcomes = || stimuli.starts.iter().map(|&start| law.window(start));
     let none = format!("none of {events} events is counted");
-    let Some(window) = first else {
+    if outcomes().all(|outcome| outcome == WindowOutcome::Never) {
         return format!(
             "{none}: no start value opens a window within {} CLK periods; give smaller start values or more --stop-periods",
             stimuli.exposure.stop_periods
         );
+    }
+    let Some(window) = outcomes().find_map(WindowOutcome::open) else {
+        return none;
     };
     let Range { start, end } = law.interval(&window);
     let ns = |time: Time| time.as_s() * 1e9;
     format!(
-        "{none}: a window sees what comes at its time after STOP, which for start value {} is from {:.1} to {:.1} ns; times in the file are fs",
+        "{none}: the window of start value {} is from {:.1} to {:.1} ns after STOP; times in the file are fs",
         window.start,
         ns(start),
         ns(end)

@@ -302,10 +302,13 @@ impl Detector {
                 OtherBins::equal_edges(self.bins())
             },
             known: self.crosstalk.iter().map(|all| all / cycles).collect(),
-            together: self.coincidence.map(|coincidence| FiringTogether {
-                least: coincidence.spads,
-                within_bins: coincidence.within_s / bin_s,
-                of_spads: coincidence.lit_spads,
+            together: self.coincidence.map(|coincidence| {
+                FiringTogether::new(
+                    coincidence.spads,
+                    coincidence.within_s / bin_s,
+                    coincidence.lit_spads,
+                    self.counted == CountedEvents::First,
+                )
             }),
             first_only: self.counted == CountedEvents::First,
             parts: f64::from(all_parts) / cycles,

@@ -6,14 +6,18 @@ use std::path::Path;
 
 use femtogate::InputError;
 
+use super::table::cells_of;
 use crate::files::guarded::open_input;
 
 /// Bytes that are looked at.
 const FIRST: u64 = 1 << 16;
 
+/// First bytes of a Parquet file.
+const PARQUET: &[u8] = b"PAR1";
+
 /// First bytes of files that only Python reads, and what they are.
 const OF_PYTHON: [(&[u8], &str); 4] = [
-    (b"PAR1", "a Parquet file"),
+    (PARQUET, "a Parquet file"),
     (b"\x89HDF", "an HDF5 file"),
     (b"MATLAB", "a file of MATLAB"),
     (b"PK\x03\x04", "an archive, as spreadsheets are"),
@@ -46,8 +50,8 @@ pub fn other_kind(path: &Path, wanted: &str) -> Option<InputError> {
         Some("is a picture; give counts".to_owned())
     } else if is_named("npz") {
         None
-    } else if let Some((_, kind)) = OF_PYTHON.iter().find(|(begin, _)| first.starts_with(begin)) {
-        Some(of_python(path, kind))
+    } else if let Some(row) = OF_PYTHON.iter().find(|(begin, _)| first.starts_with(begin)) {
+        Some(of_python(path, row))
     } else {
         let text = String::from_utf8_lossy(&first);
         let (kind, format) = kind_of_text(&text)?;
@@ -62,10 +66,10 @@ fn other_format(wanted: &str) -> String {
     format!("give that format, or a file of --format {wanted}")
 }
 
-fn of_python(path: &Path, kind: &str) -> String {
+fn of_python(path: &Path, &(begin, kind): &(&[u8], &str)) -> String {
     let mut message = format!("is {kind}, which Python reads; ");
     let file = path.file_name().unwrap_or_default().to_string_lossy();
-    if kind.contains("Parquet") {
+    if begin == PARQUET {
         let _ = write!(
             message,
             "save its column of counts with numpy.save(\"counts.npy\", numpy.stack(pandas.read_parquet({file:?})[\"counts\"]))"
@@ -101,7 +105,7 @@ fn kind_of_text(text: &str) -> Option<(&'static str, &'static str)> {
     let lines = text.lines().map(str::trim);
     let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
     let is_counts = |line: &str| {
-        let cells: Vec<&str> = line.split([',', ';', '\t', ' ']).collect();
+        let cells = cells_of(line);
         cells.len() > 1 && cells.iter().all(|cell| cell.parse::<f64>().is_ok())
     };
     // A heading, a zone, and not the line that is cut off.

@@ -109,7 +109,7 @@ fn names_no_bin(heading: &str) -> bool {
 }
 
 /// The cells of a line. A spreadsheet's comma at the end of a line, or its `1;2` with spaces beside, makes no cell.
-fn cells_of(line: &str) -> Vec<&str> {
+pub(super) fn cells_of(line: &str) -> Vec<&str> {
     let is_between = |c: char| matches!(c, ',' | ';' | '\t' | ' ');
     line.split(is_between).filter(|c| !c.is_empty()).collect()
 }
@@ -277,6 +277,8 @@ mod tests {
         assert!(said("[[1, 2], [3]]").contains("zone 1 has 1 bins"));
         assert!(said("[[1, 2], [3, null]]").contains("zone 1 has `null` in bin 1"));
         assert!(said("{\"a\": [1, 2]}").contains("not a list"));
+        let labelled = read("a.csv", b"Zone,b0,b1\n1,2,3\n").unwrap_err();
+        assert!(labelled.contains("a column Zone"), "{labelled}");
     }
 
     #[test]

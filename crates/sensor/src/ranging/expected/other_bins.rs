@@ -32,6 +32,9 @@ pub(in crate::ranging) struct FiringTogether {
     pub(in crate::ranging) within_bins: f64,
     /// SPADs in all, on which light comes evenly.
     pub(in crate::ranging) of_spads: u32,
+    /// Light, photons in a mean bin and laser cycle, of which most events come: in more light more outputs are high than may be. Of two
+    /// lights with as many events the weaker one is told.
+    most_light: f64,
 }
 
 /// How the bins of another sensor count.
@@ -83,14 +86,8 @@ impl OtherBins {
         let Some(together) = self.together else {
             return events / self.parts;
         };
-        // Events grow with light until so many SPADs are high that none is missing; the light before that is told.
-        let rate = |photons: f64| {
-            let photons = Dual::<1>::parameter(photons, 0);
-            photons * together.completes(photons * together.within_bins, self.first_only)
-        };
-        let all_high = 4.0 * f64::from(together.of_spads) / together.within_bins;
-        let most = last_below(all_high, |photons| rate(photons).slope[0] > 0.0);
-        last_below(most, |photons| rate(photons).value < events) / self.parts
+        let is_less = |photons: f64| together.rate(photons, self.first_only).value < events;
+        greatest(together.most_light, is_less) / self.parts
     }
 
     /// The chance of every bin, with its slopes with the first K parameters.
@@ -242,8 +239,8 @@ impl OtherBins {
     }
 }
 
-/// Where something ends to be so that is so from 0 on, below `most`.
-fn last_below(most: f64, is_so: impl Fn(f64) -> bool) -> f64 {
+/// The greatest number up to `most` that `is_so`, as all smaller ones are.
+fn greatest(most: f64, is_so: impl Fn(f64) -> bool) -> f64 {
     let (mut least, mut most) = (0.0, most);
     for _ in 0..50 {
         let middle = 0.5 * (least + most);
@@ -257,6 +254,31 @@ fn last_below(most: f64, is_so: impl Fn(f64) -> bool) -> f64 {
 }
 
 impl FiringTogether {
+    /// `least` of `of_spads` SPADs within a time in mean bins, of which all events count, or the first one of a laser cycle.
+    pub(in crate::ranging) fn new(
+        least: u32,
+        within_bins: f64,
+        of_spads: u32,
+        first_only: bool,
+    ) -> Self {
+        let mut together = FiringTogether {
+            least,
+            within_bins,
+            of_spads,
+            most_light: 0.0,
+        };
+        let all_high = 4.0 * f64::from(of_spads) / within_bins;
+        let grows = |photons: f64| together.rate(photons, first_only).slope[0] > 0.0;
+        together.most_light = greatest(all_high, grows);
+        together
+    }
+
+    /// Events in a mean bin and laser cycle under even light, `photons` in the same, with their slope.
+    fn rate(&self, photons: f64, first_only: bool) -> Dual<1> {
+        let photons = Dual::parameter(photons, 0);
+        photons * self.completes(photons * self.within_bins, first_only)
+    }
+
     /// The chance that a photon's SPAD is the one that was missing, where `window` photons came within the time before it; if
     /// `none_before`, given that too few had a photon.
     fn completes<const K: usize>(&self, window: Dual<K>, none_before: bool) -> Dual<K> {
