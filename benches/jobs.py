@@ -49,7 +49,7 @@ def run(command: list[str]) -> tuple[float, float, float]:
 
 def job(name: str, command: list[str], runs: int, folder: str, inner: dict[str, str]) -> None:
     """Prints a line for the whole process and one for each of `inner`, keys of frame.json."""
-    out = os.path.join(folder, "out")
+    out = tempfile.mkdtemp(dir=folder)
     times, inside = [], {key: [] for key in inner}
     report = {}
     for _ in range(runs):

@@ -14,6 +14,8 @@
 //! of the pool fire in a period is a uniform choice. What the pool does not keep is which of them share a cycle. Two
 //! bins' counts then lose the part of their correlation that passes through coincidences within a cycle: at most
 //! ρ² of their variance, where ρ = p/(1 − p) for the probability p of a photon on a SPAD in a period.
+//!
+//! By histories ([`recent`](super::recent)) the scene `van` would take 2.5 times as long, `glass` 1.6 and the street 1.2 times.
 
 #![allow(
     unsafe_code,

@@ -16,6 +16,8 @@
 //! bins farther apart depend on each other beyond what those between them tell. That is computed, too: the
 //! correlation of each two bins, from the SPADs and from the histories; k is 4, 6 or 8, the least with which
 //! they differ by no more than is to be neglected ([`CohortOptions::neglect`](super::CohortOptions)).
+//!
+//! By joint states ([`joint`](super::joint)) the street would take 2.9 times as long, with 16 000 laser cycles 4.4 times.
 
 #![allow(
     unsafe_code,

@@ -9,6 +9,9 @@
 //!          │ cycle   │ SPAD │  │doubtful │ row    │                │ bins │ SPADs│
 //!          └─────────┴──────┴──┴─────────┴────────┘                └──────┴──────┘
 //! ```
+//!
+//! Light of one layer on 16 SPADs is counted so (here, in `binning`, `tables` and `settling`), up to two photons a laser cycle.
+//! A table of bits takes 2.3 times as long with 8 Mcounts/s and 0.1 signal photons a laser cycle, and 1.4 times with 26 Mcounts/s.
 
 #![allow(
     unsafe_code,

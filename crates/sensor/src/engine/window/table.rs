@@ -10,6 +10,8 @@
 //!
 //! All bits of a word are decided at once, many words abreast, from the first row to the last. Of two photons of a SPAD, their
 //! rows tell whether the earlier one blinds the later one for certain, perhaps, or not at all.
+//!
+//! Between 2 and some 20 photons a laser cycle this is the fastest method: 1.2 to 9 times faster than the ones that it replaced (book, *Performance*).
 
 #![allow(
     unsafe_code,

@@ -2,6 +2,8 @@
 //!
 //! Each window begins some blocks of photons before its first bin, with SPADs of which nothing is known. Where that was
 //! not enough to know them in the window, it begins anew twice as far back.
+//!
+//! The street with a lens of 20 mm takes a ninth of what it takes with every photon drawn.
 
 use std::ops::Range;
 

@@ -9,6 +9,8 @@
 //!
 //! What other photons the cycle has does not matter in the first three cases: whoever shared a SPAD or a bin with
 //! them, too, would be special as well.
+//!
+//! With every laser cycle in doubt settled as a whole, 8 Mcounts/s and 0.1 signal photons would take 1.9 times as long, 26 Mcounts/s 2.8 times.
 
 use smallvec::SmallVec;
 

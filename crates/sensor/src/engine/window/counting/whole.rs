@@ -1,5 +1,8 @@
 //! Settling all SPADs of a laser cycle together: where avalanches cause others, where photons are many, where echoes of other
 //! cycles are seen, and where photons drawn with their cycle do not tell what becomes of them.
+//!
+//! Of light whose avalanches cause others only laser cycles near such an avalanche are settled so. With all of them the street with 1 % of
+//! afterpulses and of crosstalk would take 1.3 times as long.
 
 use smallvec::SmallVec;
 
