@@ -6,7 +6,7 @@ use super::error::LibertyError;
 pub(crate) use super::flip_flop::FlipFlop;
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
-use super::words::check_word;
+use super::words::{check_word, is_true};
 
 /// What a cell does, told without a look at its tables.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +60,7 @@ impl<'g, 't> Candidate<'g, 't> {
         for pin in group.of_kind("pin") {
             check_word(pin, "direction", &["input", "output", "inout", "internal"])?;
         }
-        check_word(group, "dont_use", &["true", "false"])?;
+        let dont_use = is_true(group, "dont_use")?;
         let shared = pins().any(|(_, pin)| pin.value("three_state").is_some());
         let names: BTreeSet<&str> = pins().map(|(name, _)| name).collect();
         let is_named = group.of_kind("pin").all(|pin| !pin.arguments.is_empty());
@@ -92,7 +92,7 @@ impl<'g, 't> Candidate<'g, 't> {
         Ok(role.map(|role| Candidate {
             group,
             file,
-            dont_use: group.value("dont_use") == Some("true"),
+            dont_use,
             area,
             inputs,
             outputs,

@@ -27,6 +27,18 @@ pub(super) fn check_word(
     }
 }
 
+/// Whether an attribute is there and true. Files have it in capitals, too.
+///
+/// # Errors
+/// A word that is neither true nor false.
+pub(super) fn is_true(group: &Group<'_>, attribute: &'static str) -> Result<bool, LibertyError> {
+    let word = group.value(attribute).unwrap_or("false");
+    if !word.eq_ignore_ascii_case("true") && !word.eq_ignore_ascii_case("false") {
+        check_word(group, attribute, &["true", "false"])?;
+    }
+    Ok(word.eq_ignore_ascii_case("true"))
+}
+
 /// What a `timing` group is of.
 ///
 /// # Errors

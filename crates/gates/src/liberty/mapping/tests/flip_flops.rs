@@ -104,7 +104,9 @@ fn a_scan_flip_flop_is_taken_where_there_is_no_other() {
         &[("Q", "IQ"), ("QN", "IQN")],
     );
     let unused = scan.replace("area : 9;", "area : 9; dont_use : true;");
-    for (set_and_reset, says_not_to_use) in [(&scan, false), (&unused, true)] {
+    let in_capitals = unused.replace("true", "TRUE");
+    let cases = [(&scan, false), (&unused, true), (&in_capitals, true)];
+    for (set_and_reset, says_not_to_use) in cases {
         let found = map(&(gates.clone() + &plain + set_and_reset), &[]).unwrap();
         assert_eq!(found.cells(CellKind::Dffr), ["DR_1"]);
         assert_eq!(found.cells(CellKind::Dffsr), ["SDRS_1"]);
