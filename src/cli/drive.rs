@@ -6,19 +6,18 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use serde::Serialize;
 
 use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
 use super::voice::{announce, notes, progress, say_file, say_unless_quiet};
-use crate::engine::EngineWork;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{DepthImage, ImageCell, NpyStack, Table};
-use crate::request::{ExposureReport, Spelling, check_drive_times};
+use crate::request::{Spelling, check_drive_times};
 use crate::system::{
-    DriveFrame, DriveReuse, DriveSettings, DriveSimulation, FrameClock, FrameSummary, FrameTimes,
-    NoDepth, Noise, PhaseTimes, WindowPolicy, drive_scale_m,
+    DriveConfiguration, DriveFrame, DriveLine, DriveResult, DriveSettings, DriveSimulation,
+    DriveTotals, FrameClock, NoDepth, Noise, RunReport, WindowPolicy, WrittenExposure,
+    drive_scale_m,
 };
 
 /// Arguments of `gdtof drive`.
@@ -79,62 +78,8 @@ pub(super) struct DriveArgs {
     json: bool,
 }
 
-/// A line of `frames.jsonl`.
-#[derive(Serialize)]
-struct FrameLine<'a> {
-    number: u32,
-    times: FrameTimes,
-    summary: FrameSummary,
-    reused: DriveReuse,
-    work: EngineWork,
-    run_times: PhaseTimes,
-    /// Degrees outwards.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    camera_turn_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    picture: Option<&'a str>,
-}
-
-/// `drive.json`.
-#[derive(Serialize)]
-struct Report<'a> {
-    version: &'static str,
-    #[serde(flatten)]
-    configuration: &'a Configuration<'a>,
-    frames: u32,
-    frame_period_s: f64,
-    frames_per_s: f64,
-    load_s: f64,
-    exposure_s: f64,
-    readout_s: f64,
-    macropixels: u64,
-    macropixels_reused: u64,
-    loads_reused: u32,
-    worlds_reused: u32,
-    views: u64,
-    views_reused: u64,
-    depths: u64,
-    outliers: u64,
-    work: EngineWork,
-    run_time_s: f64,
-}
-
-/// What was asked for.
-#[derive(Serialize)]
-struct Configuration<'a> {
-    #[serde(flatten)]
-    exposed: ExposureReport<'a>,
-    /// As they were asked for; none for the camera pair.
-    guides: &'a [String],
-    windows: WindowPolicy,
-    calibration: Option<&'a Path>,
-    start_s: f64,
-    clock: FrameClock,
-    segments: u32,
-    noise: Noise,
-    skip: bool,
-    self_calibrates: bool,
-}
+/// The contents of drive.json.
+type DriveReport<'a> = RunReport<DriveConfiguration<WrittenExposure<'a>>, DriveResult>;
 
 /// Runs the command.
 ///
@@ -166,11 +111,11 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         start_s: args.start_s,
         ..DriveSettings::new(frame)
     };
-    let configuration = Configuration {
+    let configuration = DriveConfiguration {
         exposed: request.exposed(scene_args.scene_name(), &settings.frame),
-        guides: &asked.guiding.guides,
+        guides: asked.guiding.guides.clone(),
         windows: settings.policy,
-        calibration: asked.calibration.as_deref(),
+        calibration: asked.calibration.clone(),
         start_s: args.start_s,
         clock: settings.clock,
         segments: args.segments,
@@ -182,26 +127,19 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     let began = Instant::now();
     let mut drive = DriveSimulation::new(&settings)?;
     let [load_s, exposure_s, readout_s] = drive.chip_s();
-    let mut report = Report {
-        version: env!("CARGO_PKG_VERSION"),
-        configuration: &configuration,
-        frames: args.frames,
+    let totals = DriveTotals {
         frame_period_s: drive.period_s(),
         frames_per_s: 1.0 / drive.period_s(),
         load_s,
         exposure_s,
         readout_s,
-        macropixels: 0,
-        macropixels_reused: 0,
-        loads_reused: 0,
-        worlds_reused: 0,
-        views: 0,
-        views_reused: 0,
-        depths: 0,
-        outliers: 0,
-        work: EngineWork::default(),
-        run_time_s: 0.0,
+        ..DriveTotals::default()
     };
+    let result = DriveResult {
+        frames: args.frames,
+        totals,
+    };
+    let mut report = DriveReport::from_parts(configuration, result);
     let mut recording = Recording::begin(results.staging(), &settings, args.frames)?;
     let mcap = results.staging().join("drive.mcap");
     let mut foxglove = if args.mcap {
@@ -232,7 +170,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
             let added = foxglove.add(&frame, picture.as_deref());
             added.map_err(|e| InputError::unwritable(&mcap, &e))?;
         }
-        report.add(&frame);
+        add_frame(&mut report.result.totals, &frame);
         progress.inc(1);
     }
     progress.finish_and_clear();
@@ -240,90 +178,86 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     if let Some(foxglove) = foxglove {
         foxglove.finish(&mcap)?;
     }
-    report.run_time_s = began.elapsed().as_secs_f64();
+    report.result.totals.run_time_s = began.elapsed().as_secs_f64();
     let json = serde_json::to_string_pretty(&report)?;
     let file = results.staging().join("drive.json");
     OutputFile::write_text(&file, &format!("{json}\n"))?;
-    notes(results.commit(&configuration)?);
+    notes(results.commit(&report.configuration)?);
     if args.json {
         Ok(say_file(format_args!("{json}\n"))?)
     } else {
-        Ok(say_unless_quiet(report.table(&args.out))?)
+        Ok(say_unless_quiet(table(&report, &args.out))?)
     }
 }
 
-impl Report<'_> {
-    fn add(&mut self, frame: &DriveFrame) {
-        let summary = frame.summary();
-        self.macropixels += frame.pixels.len() as u64;
-        self.macropixels_reused += frame.reused.macropixels as u64;
-        self.loads_reused += u32::from(frame.reused.load);
-        self.worlds_reused += u32::from(frame.reused.world);
-        self.views += (frame.worlds * frame.pixels.len()) as u64;
-        self.views_reused += frame.reused.views as u64;
-        self.depths += summary.depths as u64;
-        self.outliers += summary.outliers as u64;
-        self.work += frame.work;
-    }
+fn add_frame(totals: &mut DriveTotals, frame: &DriveFrame) {
+    let summary = frame.summary();
+    totals.macropixels += frame.pixels.len() as u64;
+    totals.macropixels_reused += frame.reused.macropixels as u64;
+    totals.loads_reused += u32::from(frame.reused.load);
+    totals.worlds_reused += u32::from(frame.reused.world);
+    totals.views += (frame.worlds * frame.pixels.len()) as u64;
+    totals.views_reused += frame.reused.views as u64;
+    totals.depths += summary.depths as u64;
+    totals.outliers += summary.outliers as u64;
+    totals.work += frame.work;
+}
 
-    fn table(&self, out: &Path) -> Table {
-        let ms = |s: f64| format!("{:.2} ms", 1e3 * s);
-        let part_of_whole = |part: u64, whole: u64| format!("{part} of {whole}");
-        let clock = self.configuration.clock;
-        let mut table = Table::new(format!(
-            "{} frames of {}",
-            self.frames, self.configuration.exposed.scene_name
-        ))
+fn table(report: &DriveReport<'_>, out: &Path) -> Table {
+    let DriveResult { frames, totals } = &report.result;
+    let ms = |s: f64| format!("{:.2} ms", 1e3 * s);
+    let part_of_whole = |part: u64, whole: u64| format!("{part} of {whole}");
+    let asked = &report.configuration;
+    let mut table = Table::new(format!("{} frames of {}", frames, asked.exposed.scene_name))
         .row(
             "frame rate",
             format!(
                 "{:.2} fps, one every {}",
-                self.frames_per_s,
-                ms(self.frame_period_s)
+                totals.frames_per_s,
+                ms(totals.frame_period_s)
             ),
         )
-        .row("guide, from images to map", ms(clock.guide_latency_s))
-        .row("load", ms(self.load_s))
-        .row("exposure", ms(self.exposure_s))
-        .row("readout", ms(self.readout_s))
+        .row("guide, from images to map", ms(asked.clock.guide_latency_s))
+        .row("load", ms(totals.load_s))
+        .row("exposure", ms(totals.exposure_s))
+        .row("readout", ms(totals.readout_s))
         .row(
             "depths, wrong by more than a bin",
-            format!("{}, {}", self.depths, self.outliers),
+            format!("{}, {}", totals.depths, totals.outliers),
         )
-        .row("photons drawn", self.work.photons_drawn)
+        .row("photons drawn", totals.work.photons_drawn)
         .row(
             "CLK periods visited",
-            part_of_whole(self.work.clk_periods_visited, self.work.clk_periods),
+            part_of_whole(totals.work.clk_periods_visited, totals.work.clk_periods),
         )
         .row(
             "macropixels not exposed again",
-            part_of_whole(self.macropixels_reused, self.macropixels),
+            part_of_whole(totals.macropixels_reused, totals.macropixels),
         )
         .row(
             "loads not run again",
-            part_of_whole(self.loads_reused.into(), self.frames.into()),
+            part_of_whole(totals.loads_reused.into(), (*frames).into()),
         )
         .row(
             "macropixels' views not cast again",
-            part_of_whole(self.views_reused, self.views),
+            part_of_whole(totals.views_reused, totals.views),
         );
-        let each = ms(self.run_time_s / f64::from(self.frames));
-        table.push(
-            "run time",
-            format!("{:.2} s, {each} a frame", self.run_time_s),
-        );
-        let names = [
-            "depth.npy",
-            "guide.npy",
-            "truth.npy",
-            "starts.npy",
-            "histograms.npy",
-        ];
-        let rest = ["frames.jsonl", "drive.json", MANIFEST];
-        table.push(format!("in {}", out.display()), names.join(" "));
-        table.push("", rest.join(" "));
-        table
-    }
+    let each = ms(totals.run_time_s / f64::from(*frames));
+    table.push(
+        "run time",
+        format!("{:.2} s, {each} a frame", totals.run_time_s),
+    );
+    let names = [
+        "depth.npy",
+        "guide.npy",
+        "truth.npy",
+        "starts.npy",
+        "histograms.npy",
+    ];
+    let rest = ["frames.jsonl", "drive.json", MANIFEST];
+    table.push(format!("in {}", out.display()), names.join(" "));
+    table.push("", rest.join(" "));
+    table
 }
 
 /// The recording of a drive: stacks of arrays whose first axis is the frame, and an index with a line for each.
@@ -360,7 +294,7 @@ impl Recording {
     }
 
     fn add(&mut self, frame: &DriveFrame, picture: Option<&str>) -> Result<(), InputError> {
-        let line = FrameLine {
+        let line = DriveLine {
             number: frame.number,
             times: frame.times,
             summary: frame.summary(),
@@ -368,7 +302,7 @@ impl Recording {
             work: frame.work,
             run_times: frame.run_times,
             camera_turn_deg: self.self_calibrates.then_some(frame.camera_turn_deg),
-            picture,
+            picture: picture.map(str::to_owned),
         };
         let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);
         let pixels = &frame.pixels;

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
-
 use crate::files::{InputError, parse_json, read_array, read_counts, read_text};
 use crate::ranging::BinProfile;
 use crate::request::read_calibration;
-use crate::system::{PixelContext, TakenFrame, TakenSettings};
+use crate::system::{
+    DriveConfiguration, DriveLine, DriveResult, PixelContext, ReadExposure, RunReport, TakenFrame,
+    TakenSettings,
+};
 
 /// A frame, or a drive of many.
 #[derive(Debug)]
@@ -31,25 +32,6 @@ pub(super) struct Recorded {
     pub(super) counts: Vec<u16>,
     /// The summary of the results, as it stands there.
     pub(super) summary: serde_json::Value,
-}
-
-/// What `drive.json` says beside its settings.
-#[derive(Deserialize)]
-struct DriveFile {
-    frames: usize,
-}
-
-#[derive(Deserialize)]
-struct FrameLine {
-    number: u32,
-    times: Times,
-    summary: serde_json::Value,
-}
-
-#[derive(Deserialize)]
-struct Times {
-    exposure_s: f64,
-    readout_s: f64,
 }
 
 const WANTED: &str = "a folder that gdtof frame or gdtof drive has written";
@@ -104,28 +86,33 @@ fn of_frame(folder: &Path, path: &Path) -> Result<Recording, InputError> {
 }
 
 fn of_drive(folder: &Path, path: &Path, every: usize) -> Result<Recording, InputError> {
-    let (settings, file) = TakenSettings::read::<DriveFile>(path, WANTED)?;
+    let RunReport::<DriveConfiguration<ReadExposure>, DriveResult> {
+        configuration,
+        result,
+        ..
+    } = RunReport::read(path, WANTED)?;
+    let settings = (configuration.exposed).settings(path, configuration.calibration)?;
+    let number = result.frames as usize;
     let sensor = &settings.sensor;
     let (pixels, bins) = (sensor.pixels(), sensor.bins);
     let index = folder.join("frames.jsonl");
     let lines = read_text(&index)?;
-    let lines: Vec<FrameLine> = lines
+    let lines: Vec<DriveLine<serde_json::Value>> = lines
         .lines()
         .map(|line| parse_json(index.display(), line, WANTED))
         .collect::<Result<_, _>>()?;
-    if lines.len() != file.frames {
+    if lines.len() != number {
         let message = format!(
-            "has {} frames and drive.json {}; drive anew",
-            lines.len(),
-            file.frames
+            "has {} frames and drive.json {number}; drive anew",
+            lines.len()
         );
         return Err(InputError::new(index.display(), message));
     }
-    let map = [file.frames, sensor.rows, sensor.cols];
+    let map = [number, sensor.rows, sensor.cols];
     let metres = |name: &str| read_array::<f32>(&folder.join(name), &map);
     let (truth, guide) = (metres("truth.npy")?, metres("guide.npy")?);
     let starts: Vec<i16> = read_array(&folder.join("starts.npy"), &map)?;
-    let all = [file.frames, sensor.rows, sensor.cols, bins];
+    let all = [number, sensor.rows, sensor.cols, bins];
     let counts = read_counts(&folder.join("histograms.npy"), &all)?;
     let some = |m: f32| (!m.is_nan()).then_some(f64::from(m));
     let mut frames = Vec::new();
@@ -139,7 +126,7 @@ fn of_drive(folder: &Path, path: &Path, every: usize) -> Result<Recording, Input
         });
         frames.push(Recorded {
             number: line.number,
-            time_s: 0.5 * (line.times.exposure_s + line.times.readout_s),
+            time_s: line.times.middle_s(),
             known: known.collect(),
             counts: counts[first * bins..(first + pixels) * bins].to_vec(),
             summary: line.summary,

@@ -6,87 +6,28 @@
 //!   Frame ─────────┴──────────────► histograms.npy
 //! ```
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use super::FrameRequest;
 use crate::analysis::VerdictReport;
 use crate::chip::{Mode, SensorConfig, WindowLaw, library_files};
-use crate::engine::{EngineWork, variance_left_out};
+use crate::engine::variance_left_out;
 use crate::files::{InputError, OutputFile, file_hash, parse_json};
 use crate::report::{DepthImage, ImageCell, write_npy_u16};
 use crate::scene::{EyeSafety, Scene, Train};
 use crate::system::{
-    DepthHint, DistanceLaw, EngineKind, Frame, FrameSettings, FrameSummary, NoDepth, PhaseTimes,
-    PixelDepth, ToleranceResult, frame_scale_m,
+    DistanceLaw, EngineKind, ExposureReport, Frame, FrameArray, FrameConfiguration, FrameResult,
+    FrameSettings, NoDepth, RunReport, WrittenExposure, frame_scale_m,
 };
 
-/// What frame.json and drive.json say of an exposure alike, first of all.
-#[derive(Debug, Serialize)]
-pub struct ExposureReport<'a> {
-    /// What reports call the scene.
-    pub scene_name: String,
-    scene: &'a Scene,
-    sensor: &'a SensorConfig,
-    /// SHA-256 of the library and netlists that the sensor names, by their files.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    sha256: BTreeMap<String, String>,
-    stop_periods: u32,
-    /// Laser cycles of the exposure.
-    pub laser_cycles: u32,
-    seed: u64,
-    engine: EngineKind,
-}
-
-/// What was asked for: in frame.json and in the manifest.
-#[derive(Debug, Serialize)]
-pub struct FrameConfiguration<'a> {
-    #[serde(flatten)]
-    exposed: ExposureReport<'a>,
-    false_alarm_rate: f64,
-    walk_correction: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibration: Option<String>,
-    #[serde(skip_serializing_if = "<[String]>::is_empty")]
-    guides: &'a [String],
-    #[serde(skip_serializing_if = "str::is_empty")]
-    windows: &'a str,
-}
-
 /// The contents of frame.json; `P` is what there is to say of a pair of pictures in the place of the scene.
-#[derive(Debug, Serialize)]
-pub struct FrameReport<'a, P = ()> {
-    version: &'static str,
-    /// What was asked for.
-    #[serde(flatten)]
-    pub configuration: FrameConfiguration<'a>,
-    summary: FrameSummary,
-    remark: Option<&'a str>,
-    hints: &'a [DepthHint],
-    photons_expected: f64,
-    work: EngineWork,
-    timing: &'a VerdictReport,
-    tolerance: Option<&'a ToleranceResult>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    variance_left_out: Option<f64>,
-    distance: DistanceLaw,
-    load_bits: usize,
-    load_time_s: f64,
-    readout_time_s: f64,
-    exposure_time_s: f64,
-    frame_time_s: f64,
-    eye_safety: Option<EyeSafety>,
-    exposure_run_time_s: f64,
-    run_time_s: f64,
-    run_times: PhaseTimes,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pair: Option<&'a P>,
-    probes: &'a [(usize, usize)],
-    histograms_shape: [usize; 3],
-    macropixels: &'a [PixelDepth],
-}
+pub type FrameReport<'a, P = ()> =
+    RunReport<FrameConfiguration<WrittenExposure<'a>>, FrameResult<'a, P>>;
 
 impl FrameRequest {
     /// What reports say of an exposure, with the scene and the sensor that `settings` made of this request.
@@ -94,7 +35,7 @@ impl FrameRequest {
         &self,
         scene_name: String,
         settings: &'a FrameSettings,
-    ) -> ExposureReport<'a> {
+    ) -> WrittenExposure<'a> {
         ExposureReport {
             scene_name,
             scene: &settings.scene,
@@ -163,19 +104,16 @@ impl<'a, P> FrameReport<'a, P> {
         frame: &'a Frame,
         pair: Option<&'a P>,
     ) -> Self {
-        FrameReport {
-            version: env!("CARGO_PKG_VERSION"),
-            configuration: FrameConfiguration {
-                exposed: request.exposed(scene_name, settings),
-                false_alarm_rate: request.false_alarm_rate,
-                walk_correction: request.correct_walk,
-                calibration: request
-                    .calibration
-                    .as_ref()
-                    .map(|p| p.display().to_string()),
-                guides: &request.guides,
-                windows: &request.windows,
-            },
+        let calibration = request.calibration.as_ref();
+        let configuration = FrameConfiguration {
+            exposed: request.exposed(scene_name, settings),
+            false_alarm_rate: Some(request.false_alarm_rate),
+            walk_correction: Some(request.correct_walk),
+            calibration: calibration.map(|path| path.display().to_string()),
+            guides: request.guides.clone(),
+            windows: request.windows.clone(),
+        };
+        let result = FrameResult {
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
             hints: &frame.hints,
@@ -204,10 +142,13 @@ impl<'a, P> FrameReport<'a, P> {
             run_time_s: frame.times.total_s(),
             run_times: frame.times,
             pair,
-            probes: &frame.probes,
-            histograms_shape: [frame.rows, frame.cols, frame.bins],
-            macropixels: &frame.pixels,
-        }
+            array: FrameArray {
+                probes: Cow::from(&frame.probes),
+                histograms_shape: [frame.rows, frame.cols, frame.bins],
+                macropixels: Cow::from(&frame.pixels),
+            },
+        };
+        RunReport::from_parts(configuration, result)
     }
 }
 
@@ -222,8 +163,7 @@ impl<P: Serialize> FrameReport<'_, P> {
         let drawn = FramePictures {
             mode: exposed.sensor.mode,
             laser_cycles: exposed.laser_cycles,
-            shape: self.histograms_shape,
-            macropixels: self.macropixels,
+            array: &self.result.array,
         };
         drawn.write(out, &text, histograms)
     }
@@ -234,25 +174,17 @@ impl<P: Serialize> FrameReport<'_, P> {
 /// # Errors
 /// As [`FrameReport::write`], and when `report` is none.
 pub fn write_frame(out: &Path, report: &str, histograms: &[u16]) -> Result<(), InputError> {
-    let read: ReadReport = parse_json("frame.json", report, "the report of a frame")?;
+    let read: RunReport<ExposureReport<IgnoredAny, Chip>, FrameArray<'_>> =
+        parse_json("frame.json", report, "the report of a frame")?;
     let drawn = FramePictures {
-        mode: read.sensor.mode,
-        laser_cycles: read.laser_cycles,
-        shape: read.histograms_shape,
-        macropixels: &read.macropixels,
+        mode: read.configuration.sensor.mode,
+        laser_cycles: read.configuration.laser_cycles,
+        array: &read.result,
     };
     drawn.write(out, report, histograms)
 }
 
-/// What frame.json says that is also in the other files.
-#[derive(Deserialize)]
-struct ReadReport {
-    sensor: Chip,
-    laser_cycles: u32,
-    histograms_shape: [usize; 3],
-    macropixels: Vec<PixelDepth>,
-}
-
+/// What the picture says of a sensor.
 #[derive(Deserialize)]
 struct Chip {
     mode: Mode,
@@ -262,13 +194,13 @@ struct Chip {
 struct FramePictures<'a> {
     mode: Mode,
     laser_cycles: u32,
-    shape: [usize; 3],
-    macropixels: &'a [PixelDepth],
+    array: &'a FrameArray<'a>,
 }
 
 impl FramePictures<'_> {
     fn write(&self, out: &Path, report: &str, histograms: &[u16]) -> Result<(), InputError> {
-        let [rows, cols, bins] = self.shape;
+        let shape = self.array.histograms_shape;
+        let [rows, cols, bins] = shape;
         if histograms.len() != rows * cols * bins {
             let message = format!(
                 "{} counts of a frame of {rows}x{cols} macropixels with {bins} bins; give one of each",
@@ -276,7 +208,7 @@ impl FramePictures<'_> {
             );
             return Err(InputError::new("histograms", message));
         }
-        write_npy_u16(&out.join("histograms.npy"), &self.shape, histograms)?;
+        write_npy_u16(&out.join("histograms.npy"), &shape, histograms)?;
         depth_map(out, self)?;
         OutputFile::write_with(&out.join("frame.json"), |file| writeln!(file, "{report}"))
     }
@@ -291,8 +223,9 @@ fn depth_map(out: &Path, drawn: &FramePictures<'_>) -> Result<(), InputError> {
         Mode::Guided => "guided",
         Mode::Conventional => "conventional",
     };
-    let [rows, cols, _] = drawn.shape;
-    let cells: Vec<ImageCell> = (drawn.macropixels.iter())
+    let [rows, cols, _] = drawn.array.histograms_shape;
+    let pixels = &drawn.array.macropixels;
+    let cells: Vec<ImageCell> = (pixels.iter())
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
             (_, Some(reason)) => ImageCell::Category(reason as usize),
             (depth_m, None) => ImageCell::Depth(depth_m.unwrap_or_default() as f32),
@@ -302,12 +235,7 @@ fn depth_map(out: &Path, drawn: &FramePictures<'_>) -> Result<(), InputError> {
         title: &format!("Depth, {mode}, {} laser cycles", drawn.laser_cycles),
         cols,
         cells: &cells,
-        range_m: frame_scale_m(
-            drawn
-                .macropixels
-                .iter()
-                .filter_map(|pixel| pixel.measured_m),
-        ),
+        range_m: frame_scale_m(pixels.iter().filter_map(|pixel| pixel.measured_m)),
         unit: "m",
         categories: &NoDepth::categories(),
         scale: (512 / rows.max(cols)).max(1),

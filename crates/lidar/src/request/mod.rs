@@ -18,8 +18,7 @@ mod wording;
 
 pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate, read_calibration};
 pub use self::frame_files::{
-    ExposureReport, FrameConfiguration, FrameReport, eye_safety_of, frame_s, variance_left_out_of,
-    write_frame,
+    FrameReport, eye_safety_of, frame_s, variance_left_out_of, write_frame,
 };
 pub use self::light::LightRequest;
 pub use self::sources::Sources;

@@ -15,6 +15,7 @@ mod policy;
 pub mod price;
 mod ranger;
 mod remark;
+mod reports;
 mod reranged;
 mod result;
 mod settings;
@@ -42,6 +43,11 @@ pub use pixel::{DepthReturn, DepthReturns, NoDepth, PixelDepth, RETURNS, point_c
 pub use policy::{NoBins, Pointing, Unguided, Why, WindowPolicy};
 pub use ranger::{PixelContext, Ranger, Reading, check_counts, range_counts};
 pub use remark::DepthHint;
+pub(crate) use reports::FrameArray;
+pub use reports::{
+    DriveConfiguration, DriveLine, DriveResult, DriveTotals, ExposureReport, FrameConfiguration,
+    FrameResult, RunReport, WrittenExposure,
+};
 pub use reranged::ArrayDepths;
 pub use result::{Frame, PhaseTimes};
 pub use settings::{EngineKind, FrameSettings, GateProbe};
@@ -49,5 +55,6 @@ pub(crate) use shared::SharedWork;
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};
 pub use summary::{FrameSummary, median};
+pub(crate) use taken::ReadExposure;
 pub use taken::{TakenFrame, TakenPixel, TakenSettings};
 pub use tolerance::{OnWindow, Tolerance, ToleranceResult};

@@ -3,15 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-use serde::de::{DeserializeOwned, IgnoredAny};
-
 use super::aim::Aims;
 use super::light::{light_in, photon_stream, truth_in};
 use super::pixel::PixelDepth;
+use super::reports::{ExposureReport, FrameConfiguration, ReadFrame, RunReport};
 use super::settings::EngineKind;
 use crate::chip::{Exposure, Sensor, SensorConfig};
-use crate::files::{InputError, parse_json, read_text};
+use crate::files::InputError;
 use crate::guide::{BehaviouralStereo, Guide, GuideInput};
 use crate::photon::SpadEvent;
 use crate::ranging::DepthOptions;
@@ -58,75 +56,19 @@ pub struct TakenFrame {
     pub(crate) summary: serde_json::Value,
 }
 
-/// The version alone, which other versions have, too.
-#[derive(Deserialize)]
-struct Version {
-    version: String,
-}
+/// An exposure that was read.
+pub(crate) type ReadExposure = ExposureReport<toml::Table, toml::Table>;
 
-/// What `frame.json` and `drive.json` have in common.
-#[derive(Deserialize)]
-struct RecordedRequest {
-    scene_name: String,
-    scene: toml::Table,
-    sensor: toml::Table,
-    stop_periods: u32,
-    laser_cycles: u32,
-    seed: u64,
-    engine: EngineKind,
-    calibration: Option<PathBuf>,
-    false_alarm_rate: Option<f64>,
-    walk_correction: Option<bool>,
-}
-
-#[derive(Deserialize)]
-struct File<T> {
-    #[serde(flatten)]
-    asked: RecordedRequest,
-    #[serde(flatten)]
-    rest: T,
-}
-
-/// What `frame.json` alone has.
-#[derive(Deserialize)]
-struct FrameFile {
-    tolerance: Option<IgnoredAny>,
-    #[serde(default)]
-    guides: Vec<String>,
-    windows: Option<IgnoredAny>,
-    #[serde(default)]
-    probes: Vec<(usize, usize)>,
-    summary: serde_json::Value,
-    macropixels: Vec<PixelDepth>,
-}
-
-impl TakenSettings {
-    /// Reads a `frame.json` or `drive.json`, and of what it says beside the settings whatever `T` has; `wanted` is what to give instead
-    /// of a file that is none.
+impl ReadExposure {
+    /// What was asked for, with this calibration.
     ///
     /// # Errors
-    /// When it cannot be read, is none, comes from another version of this program, or contradicts itself.
-    pub(crate) fn read<T: DeserializeOwned>(
+    /// When the file at `path` contradicts itself.
+    pub(crate) fn settings(
+        self,
         path: &Path,
-        wanted: &str,
-    ) -> Result<(Self, T), InputError> {
-        let ours = env!("CARGO_PKG_VERSION");
-        let source = || path.display();
-        let text = read_text(path)?;
-        let Version { version } = parse_json(source(), &text, wanted)?;
-        if version != ours {
-            let message = format!(
-                "was written by version {version}, which may draw other photons than {ours}; take it anew"
-            );
-            return Err(InputError::new(source(), message));
-        }
-        let File { asked, rest } = parse_json(source(), &text, wanted)?;
-        Ok((asked.settings(path)?, rest))
-    }
-}
-
-impl RecordedRequest {
-    fn settings(self, path: &Path) -> Result<TakenSettings, InputError> {
+        calibration: Option<PathBuf>,
+    ) -> Result<TakenSettings, InputError> {
         let source = path.display();
         let sensor = Document::from_table(format!("{source}, sensor"), self.sensor);
         let sensor = Sensor::from(SensorConfig::read_document(&sensor)?);
@@ -136,7 +78,6 @@ impl RecordedRequest {
         ))?;
         let exposure = Exposure::checked(&sensor, self.stop_periods, self.laser_cycles)
             .map_err(|fault| InputError::new(source, format!("{fault}; take it anew")))?;
-        let usual = DepthOptions::default();
         Ok(TakenSettings {
             scene_name: self.scene_name,
             scene,
@@ -144,12 +85,8 @@ impl RecordedRequest {
             exposure,
             seed: self.seed,
             engine: self.engine,
-            depth: DepthOptions {
-                false_alarm_rate: self.false_alarm_rate.unwrap_or(usual.false_alarm_rate),
-                correct_walk: self.walk_correction.unwrap_or(usual.correct_walk),
-                ..usual
-            },
-            calibration: self.calibration,
+            depth: DepthOptions::default(),
+            calibration,
         })
     }
 }
@@ -172,8 +109,17 @@ impl TakenFrame {
     /// When it cannot be read, is none, comes from another version of this program, or contradicts itself.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let wanted = "the frame.json of a frame that `gdtof frame` has taken";
-        let (settings, file) = TakenSettings::read::<FrameFile>(path, wanted)?;
-        let pixels = file.macropixels;
+        let RunReport {
+            configuration,
+            result,
+            ..
+        } = RunReport::<FrameConfiguration<ReadExposure>, ReadFrame>::read(path, wanted)?;
+        let calibration = configuration.calibration.map(PathBuf::from);
+        let mut settings = configuration.exposed.settings(path, calibration)?;
+        let depth = &mut settings.depth;
+        depth.false_alarm_rate = (configuration.false_alarm_rate).unwrap_or(depth.false_alarm_rate);
+        depth.correct_walk = (configuration.walk_correction).unwrap_or(depth.correct_walk);
+        let pixels = result.array.macropixels.into_owned();
         let sensor = &settings.sensor;
         if pixels.len() != sensor.pixels() {
             let message = format!(
@@ -186,13 +132,13 @@ impl TakenFrame {
         }
         Ok(TakenFrame {
             source: path.display().to_string(),
-            has_tolerance: file.tolerance.is_some(),
+            has_tolerance: result.tolerance.is_some(),
             is_plain: settings.calibration.is_none()
-                && file.guides.is_empty()
-                && file.windows.is_none(),
+                && configuration.guides.is_empty()
+                && configuration.windows.is_empty(),
             pixels,
-            probes: file.probes,
-            summary: file.summary,
+            probes: result.array.probes.into_owned(),
+            summary: result.summary,
             settings,
         })
     }

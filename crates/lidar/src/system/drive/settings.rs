@@ -38,7 +38,7 @@ impl Default for FrameClock {
 }
 
 /// When what happened in a frame, s on the scene's clock.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FrameTimes {
     /// The cameras see the world.
     pub images_s: f64,
