@@ -100,6 +100,18 @@ pub struct Layout {
     pub marks: Vec<Mark>,
 }
 
+impl Layout {
+    /// These groups, from when to when, and the marker; no further marks.
+    pub fn new(groups: Vec<SignalGroup>, zoom: (Time, Time), marker: Time) -> Self {
+        Layout {
+            groups,
+            zoom,
+            marker: Some(marker),
+            marks: Vec::new(),
+        }
+    }
+}
+
 /// A marked instant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mark {
