@@ -9,19 +9,18 @@
 //! Photons are placed by the window law. What is found is counted by the gates.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{
     Exposure, Overflow, Probe, SensorConfig, Tdc, WindowLaw, array, hslidar, metdc_counter, probes,
 };
 use crate::engine::GateSimulation;
-use crate::engine::waveform::write_waves;
 use crate::files::InputError;
 use crate::kernel::Recorder;
 use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::{self, record_exposure};
 use crate::units::Time;
 use crate::waves::{Entry, Layout, SignalGroup};
 
@@ -87,13 +86,8 @@ fn photons(config: &SensorConfig, exposure: &Exposure, of_bins: &[u8]) -> Vec<Sp
     pulses
 }
 
-fn simulation(config: &SensorConfig, exposure: &Exposure, pulses: &[SpadEvent]) -> GateSimulation {
-    GateSimulation::new(config, exposure, (0, 0), (1, 1), &[START], &[pulses])
-}
-
-fn counts(gate: &GateSimulation) -> Vec<u16> {
-    let histograms = gate.histograms().ok();
-    histograms.map_or(Vec::new(), |h| h.into_counts())
+fn counts(config: &SensorConfig, exposure: &Exposure, pulses: &[SpadEvent]) -> Vec<u16> {
+    rig::counts(config, exposure, (0, 0), START, pulses).unwrap_or_default()
 }
 
 /// Two laser cycles, watched CLK period by CLK period.
@@ -110,8 +104,7 @@ fn window_by_window(
     let exposure = Exposure::new(&config, STOP_PERIODS, 2);
     let (law, opens) = window(&config, &exposure);
     let pulses = photons(&config, &exposure, &PHOTONS);
-    let mut gate = simulation(&config, &exposure, &pulses);
-    let netlist = Arc::clone(gate.netlist());
+    let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[START], &[&pulses]);
     let nets = |probe| gate.probes()[0].bus(probe).to_vec();
     let [local_stop, start, select] = [Probe::LocalStop, Probe::Start, Probe::Select].map(nets);
     let watched = [&local_stop[..], &start, &select].concat();
@@ -122,17 +115,18 @@ fn window_by_window(
         origin + edges.edges()[0],
         origin + edges.edges()[config.bins],
     );
-    write_waves(waves, &netlist, &view(&config, shown, origin), |waves| {
-        gate.run(&mut (&mut recorder, waves));
-        gate.schedule().end
-    })?;
+    let view = view(&config, shown, origin);
+    record_exposure(&mut gate, waves, &view, &mut recorder)?;
 
     let cycles = exposure.laser_cycles;
     let expected = PHOTONS.map(|photons| u16::from(photons) * cycles as u16);
     checks.equal(
         format!("photons a laser cycle {PHOTONS:?}, {cycles} cycles: bins"),
         format!("{expected:?}"),
-        format!("{:?}", counts(&gate)),
+        format!(
+            "{:?}",
+            gate.histograms().map_or(Vec::new(), |h| h.into_counts())
+        ),
     );
     let rises = |nets: &[_]| {
         let rises = recorder.rising_edges(nets[0]).into_iter();
@@ -178,8 +172,6 @@ fn beside_other_tdcs(checks: &mut Checks) {
             let config = chip(tdc);
             let exposure = Exposure::new(&config, STOP_PERIODS, 1);
             let pulses = photons(&config, &exposure, &[0, 0, 0, photons_in_bin]);
-            let mut gate = simulation(&config, &exposure, &pulses);
-            gate.run(&mut ());
             let mut bins = vec![0; config.bins];
             bins[3] = expected;
             checks.equal(
@@ -188,7 +180,7 @@ fn beside_other_tdcs(checks: &mut Checks) {
                     tdc.name()
                 ),
                 format!("{bins:?}"),
-                format!("{:?}", counts(&gate)),
+                format!("{:?}", counts(&config, &exposure, &pulses)),
             );
         }
     }
@@ -204,15 +196,14 @@ fn full_bins(config: &SensorConfig, checks: &mut Checks) {
         };
         let exposure = Exposure::new(&config, STOP_PERIODS, 3);
         let pulses = photons(&config, &exposure, &[6]);
-        let mut gate = simulation(&config, &exposure, &pulses);
-        gate.run(&mut ());
+        let found = counts(&config, &exposure, &pulses);
         checks.equal(
             format!(
                 "18 photons, 6 at once, in a bin of 4 bits, overflow = {:?}",
                 overflow.name()
             ),
             expected,
-            counts(&gate).first().copied().unwrap_or(0),
+            found.first().copied().unwrap_or(0),
         );
     }
 }
@@ -233,17 +224,13 @@ fn view(config: &SensorConfig, shown: (Time, Time), origin: Time) -> Layout {
     ];
     let bins = (0..config.bins).map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
     let period = config.clock().period();
-    Layout {
-        groups: vec![
-            SignalGroup::new(
-                "Global signals",
-                [Entry::binary("CLK"), Entry::binary("STOP")],
-            ),
-            SignalGroup::new(format!("Window of start value {START}"), window),
-            SignalGroup::new("Events", events.into_iter().chain(bins)),
-        ],
-        zoom: (shown.0 - period * 2, shown.1 + period * 3),
-        marker: Some(origin),
-        marks: Vec::new(),
-    }
+    let groups = vec![
+        SignalGroup::new(
+            "Global signals",
+            [Entry::binary("CLK"), Entry::binary("STOP")],
+        ),
+        SignalGroup::new(format!("Window of start value {START}"), window),
+        SignalGroup::new("Events", events.into_iter().chain(bins)),
+    ];
+    Layout::new(groups, (shown.0 - period * 2, shown.1 + period * 3), origin)
 }

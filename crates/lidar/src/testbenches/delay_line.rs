@@ -8,18 +8,18 @@
 //! What is expected is the window law's, whose edges are measured by static timing; what is found is counted by the gates.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use crate::chip::{
     Exposure, Probe, Sensor, SensorConfig, SensorPins, WindowLaw, array, hslidar_delay_line, probes,
 };
 use crate::engine::GateSimulation;
-use crate::engine::waveform::{hits, write_waves};
+use crate::engine::waveform::hits;
 use crate::files::InputError;
 use crate::kernel::Recorder;
 use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::{self, record_exposure};
 use crate::units::Time;
 use crate::waves::{Entry, Layout, SignalGroup};
 
@@ -71,14 +71,11 @@ fn edges(waves: &Path, sensor: &Sensor, checks: &mut Checks) -> Result<(), Input
     let pulses: Vec<&[SpadEvent]> = lists.iter().map(Vec::as_slice).collect();
     let place = (0, COLUMN);
     let mut gate = GateSimulation::new(sensor, &exposure, place, (1, 2), &STARTS, &pulses);
-    let netlist = Arc::clone(gate.netlist());
-    let local_stop = SensorPins::find(&netlist).local_stop;
+    let local_stop = SensorPins::find(gate.netlist()).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
-    write_waves(waves, &netlist, &view(sensor, &exposure, origin), |waves| {
-        gate.run(&mut (&mut recorder, waves));
-        gate.schedule().end
-    })?;
+    let view = view(sensor, &exposure, origin);
+    record_exposure(&mut gate, waves, &view, &mut recorder)?;
 
     // Before the first edge nothing counts, nor at the last.
     let expected = vec![2u16; sensor.bins];
@@ -147,11 +144,7 @@ fn meetings(sensor: &Sensor, checks: &mut Checks) {
             .filter(|(_, time)| *time < exposure.end())
             .map(|(spad, time)| SpadEvent { time, spad })
             .collect();
-        let place = (0, COLUMN);
-        let mut gate =
-            GateSimulation::new(sensor, &exposure, place, (1, 1), &STARTS[..1], &[&pulses]);
-        gate.run(&mut ());
-        let counts = gate.histograms().ok().map(|h| h.into_counts());
+        let counts = rig::counts(sensor, &exposure, (0, COLUMN), STARTS[0], &pulses);
         let counts = counts.unwrap_or_default().into_iter().enumerate();
         let found: Vec<usize> = counts.filter(|(_, n)| *n > 0).map(|(bin, _)| bin).collect();
         checks.equal(what, format!("bins {bins:?}"), format!("bins {found:?}"));
@@ -187,10 +180,5 @@ fn view(sensor: &Sensor, exposure: &Exposure, origin: Time) -> Layout {
             signals.into_iter().chain(bins),
         ));
     }
-    Layout {
-        groups,
-        zoom: (origin, origin + exposure.stop(1)),
-        marker: Some(origin),
-        marks: Vec::new(),
-    }
+    Layout::new(groups, (origin, origin + exposure.stop(1)), origin)
 }

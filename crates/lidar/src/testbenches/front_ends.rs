@@ -46,7 +46,7 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     folds(&points, &laws, checks);
     charts(waves, &points, &laws)?;
     let end = BEGIN + Time::from_ns(150);
-    write_waves(waves, &bench.netlist, &view(), |waves| {
+    write_waves(waves, &bench.rig.netlist, &view(), |waves| {
         bench.simulate(SHOWN_HZ, end, waves);
         end
     })

@@ -13,11 +13,13 @@ use crate::chip::{CellLibrary, LoadPins, LoadProbe, Probe, SensorConfig, load_pa
 use crate::engine::load::{load, load_netlist};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
+use crate::kernel::{Kernel, Recorder};
 use crate::logic::Logic::{One, X, Zero};
-use crate::netlist::{CellKind, NetId, Netlist, Timing};
+use crate::netlist::{CellKind, NetId};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::{self, Drives, Rig};
+use crate::testbenches::text::in_a_row;
 use crate::units::{Frequency, Time};
 use crate::waves::{Entry, Layout, SignalGroup};
 use bitvec::slice::BitSlice;
@@ -51,39 +53,25 @@ fn start_values(config: &SensorConfig, seed: u32) -> Vec<u16> {
         .collect()
 }
 
-/// The load path under test, its pins, and what has been driven into them.
+/// The load path under test, and its pins.
 struct Bench {
     config: SensorConfig,
-    netlist: Netlist,
-    resetb: NetId,
-    enable: NetId,
-    clk: NetId,
-    serial: NetId,
+    rig: Rig,
+    pins: LoadPins,
     row_bits: Vec<NetId>,
     memory_load: Vec<NetId>,
-    drives: Vec<Drive>,
 }
 
 impl Bench {
     fn new(config: SensorConfig) -> Self {
-        let netlist = load_netlist(&config);
-        let pins = LoadPins::find(&netlist);
-        let mut bench = Bench {
-            resetb: pins.resetb,
-            enable: pins.enable,
-            clk: pins.clk,
-            serial: pins.serial,
-            row_bits: LoadProbe::Row.bus(&netlist),
-            memory_load: LoadProbe::MemoryLoad.bus(&netlist),
-            drives: Vec::new(),
+        let rig = Rig::of_netlist(load_netlist(&config), config.corner);
+        Bench {
+            pins: LoadPins::find(&rig.netlist),
+            row_bits: LoadProbe::Row.bus(&rig.netlist),
+            memory_load: LoadProbe::MemoryLoad.bus(&rig.netlist),
             config,
-            netlist,
-        };
-        for net in [bench.resetb, bench.enable, bench.clk, bench.serial] {
-            bench.drives.push(Drive::new(Time::ZERO, net, false));
+            rig,
         }
-        bench.drives.push(Drive::new(RESET_END, bench.resetb, true));
-        bench
     }
 
     fn clock(&self) -> Frequency {
@@ -92,26 +80,21 @@ impl Bench {
 
     /// Sends `bits` from `start` on, changing them with falling LOAD_CLK edges; LOAD_ENABLE falls half a period
     /// after the last LOAD_CLK pulse. Returns that time.
-    fn send(&mut self, start: Time, bits: &BitSlice) -> Time {
+    fn send(&self, drives: &mut Drives, start: Time, bits: &BitSlice) -> Time {
         let clock = self.clock();
         let half = |k: usize| start + clock.half_periods(k as i64);
-        self.drives
-            .push(Drive::new(start - RESET_END, self.enable, true));
         for (k, bit) in bits.iter().enumerate() {
-            self.drives.push(Drive::new(half(2 * k), self.serial, *bit));
-            self.drives
-                .push(Drive::new(half(2 * k + 1), self.clk, true));
-            self.drives
-                .push(Drive::new(half(2 * k + 2), self.clk, false));
+            drives.set(half(2 * k), self.pins.serial, *bit);
+            drives.pulse(self.pins.clk, half(2 * k + 1), half(2 * k + 2));
         }
         let end = half(2 * bits.len() + 1);
-        self.drives.push(Drive::new(end, self.enable, false));
+        drives.pulse(self.pins.enable, start - RESET_END, end);
         end
     }
 
     /// Start values in the memories now; `None` where a bit is unknown.
     fn memories(&self, kernel: &Kernel) -> Vec<Option<u64>> {
-        let memories = probes::memories(&self.netlist, self.config.rows, self.config.cols);
+        let memories = probes::memories(&self.rig.netlist, self.config.rows, self.config.cols);
         memories.iter().map(|nets| kernel.number(nets)).collect()
     }
 }
@@ -148,7 +131,10 @@ fn small_array(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         ..SensorConfig::default()
     };
     let bits_per_row = config.cols * config.counter_bits;
-    let mut bench = Bench::new(config.clone());
+    let bench = Bench::new(config.clone());
+    let pins = &bench.pins;
+    let mut drives = Drives::low([pins.resetb, pins.enable, pins.clk, pins.serial]);
+    drives.set(RESET_END, pins.resetb, true);
     let stream = |codes: &[u16]| load_path::stream(codes, config.cols, config.counter_bits);
     let values: Vec<Vec<u16>> = (1..=4)
         .map(|seed| start_values(&config, 1000 * seed))
@@ -172,29 +158,24 @@ fn small_array(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let mut start = FIRST_LOAD;
     for (codes, length) in values.iter().zip([None, None, Some(cut), None]) {
         let stream = stream(codes);
-        let end = bench.send(start, &stream[..length.unwrap_or(stream.len())]);
+        let end = bench.send(
+            &mut drives,
+            start,
+            &stream[..length.unwrap_or(stream.len())],
+        );
         spans.push((start, end));
         start = end + PAUSE;
     }
 
-    let mut kernel = Kernel::new(
-        &bench.netlist,
-        &Timing::nominal(&bench.netlist, CellLibrary::BUILT_IN.cells(), config.corner),
-    );
-    let mut stimulus = Stimulus::sorted(std::mem::take(&mut bench.drives));
-    let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
+    let (mut kernel, mut stimulus) = (bench.rig.kernel(), drives.sorted());
+    let mut recorder = Recorder::new(bench.rig.nets());
     let mut found = Vec::new();
     let view = view(&config, spans[0]);
-    write_waves(waves, &bench.netlist, &view, |waves| {
+    write_waves(waves, &bench.rig.netlist, &view, |waves| {
         let mut observers = (&mut recorder, waves);
         for &(_, end) in &spans {
-            kernel
-                .run(
-                    &mut stimulus,
-                    end + bench.clock().periods(2),
-                    &mut observers,
-                )
-                .expect("no loop of cells without delay");
+            let end = end + bench.clock().periods(2);
+            rig::run(&mut kernel, &mut stimulus, end, &mut observers);
             found.push(bench.memories(&kernel));
         }
         kernel.now()
@@ -217,15 +198,10 @@ fn small_array(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         let within = all
             .iter()
             .filter(|p| (start..end + PAUSE).contains(&p.rise));
-        let order = |rows: &mut dyn Iterator<Item = usize>| {
-            rows.map(|row| row.to_string())
-                .collect::<Vec<_>>()
-                .join(" ")
-        };
         checks.equal(
             format!("{what}: MEMORY_LOAD pulses, by row"),
-            order(&mut (0..*rows)),
-            order(&mut within.map(|pulse| pulse.row)),
+            in_a_row(0..*rows),
+            in_a_row(within.map(|pulse| pulse.row)),
         );
     }
     let changes = |net: &NetId, to| {
@@ -317,7 +293,7 @@ fn duration(
     checks: &mut Checks,
 ) {
     let within = |t: &Time| (start..=end).contains(t);
-    let mut rises = recorder.rising_edges(bench.clk);
+    let mut rises = recorder.rising_edges(bench.pins.clk);
     rises.retain(within);
     checks.equal(
         format!("{what}: LOAD_CLK rises in a load"),
@@ -325,7 +301,7 @@ fn duration(
         rises.len(),
     );
     let disabled = recorder
-        .falling_edges(bench.enable)
+        .falling_edges(bench.pins.enable)
         .into_iter()
         .find(|t| *t > start);
     let first = rises.first().copied().unwrap_or(Time::ZERO);
@@ -344,8 +320,8 @@ fn whole_sensor(checks: &mut Checks) {
     let bench = Bench::new(SensorConfig::default());
     let config = &bench.config;
     let starts = start_values(config, 0);
-    let mut recorder = Recorder::new([bench.clk, bench.enable]);
-    let found = load(config, &bench.netlist, &starts, &mut recorder);
+    let mut recorder = Recorder::new([bench.pins.clk, bench.pins.enable]);
+    let found = load(config, &bench.rig.netlist, &starts, &mut recorder);
     let right = found
         .starts
         .iter()
@@ -393,10 +369,5 @@ fn view(config: &SensorConfig, (start, end): (Time, Time)) -> Layout {
             [Entry::binary(load)].into_iter().chain(memories),
         ));
     }
-    Layout {
-        groups,
-        zoom: (Time::ZERO, end + PAUSE),
-        marker: Some(start),
-        marks: Vec::new(),
-    }
+    Layout::new(groups, (Time::ZERO, end + PAUSE), start)
 }

@@ -8,23 +8,24 @@
 //!
 //! Everything goes through the sensor's pins: serial load, CLK, STOP and the SPADs' pulses.
 
+mod photons;
+
 use std::fmt::Debug;
 use std::path::Path;
-use std::sync::Arc;
 
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{
-    self, EventType, Exposure, Mode, Overflow, Probe, SensorConfig, SensorPins, Tdc, WindowLaw,
-    array, correlation, histogram, probes,
+    self, EventType, Exposure, Mode, Probe, SensorConfig, SensorPins, Tdc, WindowLaw, array, probes,
 };
 use crate::engine::GateSimulation;
-use crate::engine::waveform::{hits, write_waves};
+use crate::engine::waveform::hits;
 use crate::files::InputError;
 use crate::kernel::Recorder;
 use crate::netlist::Netlist;
 use crate::photon::{SpadEvent, apply_dead_time};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::{beside, record_exposure};
 use crate::testbenches::testbench::GivenSensor;
 use crate::units::Time;
 use crate::waves::{Entry, Layout, Mark, SignalGroup};
@@ -48,18 +49,16 @@ pub(super) const TESTBENCH: Testbench = Testbench {
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     two_windows(waves, &config(), FIG_48, "Fig. 48", checks)?;
-    let hslidar = waves
-        .with_file_name("tb_macropixel_hslidar")
-        .with_extension(waves.extension().unwrap_or_default());
+    let hslidar = beside(waves, "tb_macropixel_hslidar");
     let chip = SensorConfig {
         rows: 1,
         ..(*chip::hslidar()).clone()
     };
     two_windows(&hslidar, &chip, HSLIDAR, "4.9.3", checks)?;
-    bin_edge(checks);
-    full_bins(checks);
-    coincidences(&config(), checks);
-    cancelling_pulses(checks);
+    photons::bin_edge(checks);
+    photons::full_bins(checks);
+    photons::coincidences(&config(), checks);
+    photons::cancelling_pulses(checks);
     Ok(())
 }
 
@@ -74,7 +73,7 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
     };
     let starts = window_starts(&sensor)?;
     two_windows(waves, &sensor, starts, "Fig. 48", checks)?;
-    coincidences(&sensor, checks);
+    photons::coincidences(&sensor, checks);
     Ok(())
 }
 
@@ -167,20 +166,6 @@ fn middle(law: &WindowLaw, window: &OpenWindow, cycle: u32, bin: i64) -> Time {
     Time::from_fs((bin.start + bin.end).as_fs() / 2)
 }
 
-/// What the gates count with one start value; `None` where a bin is unknown.
-fn gate_counts(
-    config: &SensorConfig,
-    exposure: &Exposure,
-    start: u16,
-    pulses: &mut [SpadEvent],
-) -> Option<Vec<u16>> {
-    pulses.sort_unstable();
-    let size = (1, 1);
-    let mut gate = GateSimulation::new(config, exposure, (0, 0), size, &[start], &[pulses]);
-    gate.run(&mut ());
-    Some(gate.histograms().ok()?.into_counts())
-}
-
 /// What the window law says is counted of pulses that come alone in their CLK period.
 fn by_law(
     config: &SensorConfig,
@@ -237,8 +222,7 @@ fn two_windows(
 
     let lists = [&pulses[..], &pulses[..]];
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &starts, &lists);
-    let netlist = Arc::clone(gate.netlist());
-    let local_stop = SensorPins::find(&netlist).local_stop;
+    let local_stop = SensorPins::find(gate.netlist()).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
     // Edges of the bins of both windows, the earlier one's first.
@@ -246,15 +230,12 @@ fn two_windows(
         (0..=(config.bins + shift) as i64).map(|bin| law.bin_interval(&second, 0, bin).start);
     let edges: Vec<Time> = edges.map(|edge| origin + edge).collect();
     let view = view(
-        (&config, &netlist),
+        (&config, gate.netlist()),
         (starts, figure),
         (origin, origin + exposure.stop(1)),
         edges,
     );
-    write_waves(waves, &netlist, &view, |waves| {
-        gate.run(&mut (&mut recorder, waves));
-        gate.schedule().end
-    })?;
+    record_exposure(&mut gate, waves, &view, &mut recorder)?;
 
     checks.equal(
         "start values loaded",
@@ -376,155 +357,5 @@ fn view(
         zoom: (shown.0 - Time::from_ns(5), shown.1),
         marker: Some(origin),
         marks,
-    }
-}
-
-/// One photon, femtosecond by femtosecond across the edge between two bins.
-fn bin_edge(checks: &mut Checks) {
-    let (config, start, bin) = (config(), 20, 8);
-    let exposure = Exposure::new(&config, STOP_PERIODS, 1);
-    let (law, window) = window(&config, &exposure, start);
-    let edge = law.bin_interval(&window, 0, bin).start;
-    for offset_fs in -2..=2 {
-        let time = edge + Time::from_fs(offset_fs);
-        let mut pulse = [SpadEvent { time, spad: 7 }];
-        let found = gate_counts(&config, &exposure, start, &mut pulse);
-        let bins = |counts: &[u16]| -> Vec<usize> {
-            (0..counts.len()).filter(|&b| counts[b] > 0).collect()
-        };
-        checks.equal(
-            format!(
-                "photon {offset_fs:+} fs from the edge of bins {} and {bin}: bin",
-                bin - 1
-            ),
-            counts_text(&Some([if offset_fs < 0 { bin - 1 } else { bin }])),
-            counts_text(&found.map(|counts| bins(&counts))),
-        );
-    }
-}
-
-/// More photons than a small bin can count.
-fn full_bins(checks: &mut Checks) {
-    for overflow in [Overflow::Saturate, Overflow::Wrap] {
-        let config = SensorConfig {
-            bin_bits: 3,
-            overflow,
-            ..config()
-        };
-        let (start, bin) = (20, 5);
-        let exposure = Exposure::new(&config, 32, 12);
-        let (law, window) = window(&config, &exposure, start);
-        let mut pulses: Vec<SpadEvent> = (0..exposure.laser_cycles)
-            .map(|cycle| SpadEvent {
-                time: middle(&law, &window, cycle, bin),
-                spad: cycle as u8,
-            })
-            .collect();
-        let hits = pulses.len() as u64;
-        let found = gate_counts(&config, &exposure, start, &mut pulses);
-        checks.equal(
-            format!(
-                "{hits} photons in a bin of {} bits, overflow = {overflow:?}",
-                config.bin_bits
-            ),
-            counts_text(&Some(histogram::model(
-                hits,
-                config.bin_bits as u32,
-                overflow,
-            ))),
-            counts_text(&found.map(|counts| counts[bin as usize])),
-        );
-    }
-}
-
-/// Bin b gets b coincident photons, and TYPE and THRESHOLD pick the bins.
-fn coincidences(sensor: &SensorConfig, checks: &mut Checks) {
-    let start = 20;
-    let cases = [
-        (EventType::Greater, 0),
-        (EventType::Greater, 3),
-        (EventType::Equal, 2),
-        (EventType::Less, 4),
-        (EventType::Greater, 16),
-    ];
-    for (event_type, threshold) in cases {
-        let config = SensorConfig {
-            bins: 6,
-            event_type,
-            threshold,
-            dead_time_ns: 1.0,
-            ..sensor.clone()
-        };
-        let exposure = Exposure::new(&config, 32, 1);
-        let is_possible = start <= config.largest_start() && config.check().is_ok();
-        // A block of one's own has the bins that it has.
-        let found = is_possible.then(|| find_window(&config, &exposure, start));
-        let Some((law, window)) = found.flatten() else {
-            continue;
-        };
-        let spads = |bin: usize| (1u64 << bin) - 1;
-        let mut pulses = Vec::new();
-        for bin in 0..config.bins {
-            let time = middle(&law, &window, 0, bin as i64);
-            pulses.extend((0..bin as u8).map(|spad| SpadEvent { time, spad }));
-        }
-        let expected: Vec<u16> = (0..config.bins)
-            .map(|bin| correlation::model(spads(bin), event_type, threshold) as u16)
-            .collect();
-        let found = gate_counts(&config, &exposure, start, &mut pulses);
-        checks.equal(
-            format!(
-                "0 to {} coincident photons, TYPE = {event_type:?} than {threshold}",
-                config.bins - 1
-            )
-            .replace("Equal than", "Equal to"),
-            counts_text(&Some(expected)),
-            counts_text(&found),
-        );
-    }
-}
-
-/// A toggle front end loses two pulses of one SPAD within one CLK period.
-fn cancelling_pulses(checks: &mut Checks) {
-    let config = SensorConfig {
-        dead_time_ns: 0.5,
-        ..config()
-    };
-    let (start, bin) = (20, 6);
-    let exposure = Exposure::new(&config, 32, 1);
-    let (law, window) = window(&config, &exposure, start);
-    let centre = middle(&law, &window, 0, bin);
-    let apart = Time::from_ps(500);
-    let pulse = |time, spad| SpadEvent { time, spad };
-    let bin_start = law.bin_interval(&window, 0, bin).start;
-    let cases = [
-        ("one pulse of a SPAD", vec![pulse(centre, 3)], 0, 1),
-        (
-            "two pulses of one SPAD within one CLK period cancel",
-            vec![pulse(centre - apart, 3), pulse(centre + apart, 3)],
-            0,
-            0,
-        ),
-        (
-            "pulses of two SPADs within one CLK period are one event",
-            vec![pulse(centre - apart, 3), pulse(centre + apart, 4)],
-            0,
-            1,
-        ),
-        (
-            "two pulses of one SPAD on either side of a bin's edge",
-            vec![pulse(bin_start - apart, 3), pulse(bin_start + apart, 3)],
-            1,
-            1,
-        ),
-    ];
-    for (what, mut pulses, before, within) in cases {
-        let found = gate_counts(&config, &exposure, start, &mut pulses);
-        let bin = bin as usize;
-        checks.equal(
-            format!("{what}: bins {} and {bin}", bin - 1),
-            counts_text(&Some([before, within])),
-            counts_text(&found.map(|counts| [counts[bin - 1], counts[bin]])),
-        );
     }
 }

@@ -1,7 +1,7 @@
 //! Testbenches: each drives one block of the chip at gate level, checks what it does and leaves its waveform.
 //!
 //! `gdtof tb` runs them, as do the binaries `tb_*`. A new one is a file here with a `TESTBENCH`, and its line in
-//! [`TESTBENCHES`].
+//! [`TESTBENCHES`]. It has stimulus, layout and expectations; netlist, kernel and waveform are those of the rig (`rig.rs`).
 
 mod counter_tdc;
 mod delay_line;
@@ -11,9 +11,11 @@ mod macropixel;
 mod p_counter;
 mod p_counter_variants;
 mod readout;
+mod rig;
 mod ripple_hazard;
 mod tdc;
 mod testbench;
+mod text;
 
 pub use testbench::Testbench;
 

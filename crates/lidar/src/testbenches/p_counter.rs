@@ -10,6 +10,7 @@
 //! ENABLE changes with rising STOP edges, as in the sensor, where a flip-flop on STOP sees to it.
 
 mod laser_cycles;
+mod start_values;
 
 use std::path::{Path, PathBuf};
 
@@ -19,12 +20,14 @@ use crate::chip::{
 };
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Observer, Recorder, Stimulus, clock};
+use crate::kernel::{Observer, Recorder};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, ModuleBuilder, NetId, Netlist, Timing};
+use crate::netlist::{CellKind, ModuleBuilder, NetId, Netlist};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::{self, Drives, Rig, finished};
 use crate::testbenches::testbench::GivenSensor;
+use crate::testbenches::text::{in_a_row, number_text};
 use crate::units::Time;
 use crate::waves::{Entry, Layout, SignalGroup};
 
@@ -71,7 +74,7 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
         checks.add_verdict(what, "a law", uneven, law.uneven().is_none());
     }
     figure_54(&bench, waves, checks)?;
-    every_start_value(&bench, checks);
+    start_values::ripple(&bench, checks);
     laser_cycles::count_alike(&bench, checks);
     Ok(())
 }
@@ -80,7 +83,7 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
 struct Bench {
     config: SensorConfig,
     timing: ChipTiming,
-    netlist: Netlist,
+    rig: Rig,
     clk: NetId,
     stop: NetId,
     resetb: NetId,
@@ -119,13 +122,13 @@ impl Bench {
             && config.after_borrow == AfterBorrow::Hold
             && config.step_periods == 1
             && config.p_counter_block.is_none();
-        let netlist = circuit(&config);
-        let probes = Probes::below_instance(&netlist, "");
+        let rig = circuit(&config);
+        let probes = Probes::below_instance(&rig.netlist, "");
         let net = |probe| probes.net(probe);
         Bench {
             clk: net(Probe::Clk),
             stop: net(Probe::Stop),
-            resetb: netlist.net("RESETB").expect("a pin of the circuit"),
+            resetb: rig.net("RESETB"),
             enable: net(Probe::Enable),
             init: probes.bus(Probe::CounterInit).to_vec(),
             load: net(Probe::MemoryLoad),
@@ -139,47 +142,27 @@ impl Bench {
             local_stop: net(Probe::LocalStop),
             timing: ChipTiming::new(&config),
             config,
-            netlist,
+            rig,
         }
     }
 
-    fn kernel(&self) -> Kernel {
-        Kernel::new(
-            &self.netlist,
-            &Timing::nominal(
-                &self.netlist,
-                CellLibrary::BUILT_IN.cells(),
-                self.config.corner,
-            ),
-        )
-    }
-
     /// Power-up: everything low but CLK, and RESETB released at [`RESET_END`].
-    fn power_up(&self) -> Vec<Drive> {
-        let start = |net, value: bool| Drive::new(Time::ZERO, net, value);
-        let mut drives: Vec<Drive> = self.init.iter().map(|&net| start(net, false)).collect();
-        drives
-            .extend([self.stop, self.resetb, self.enable, self.load].map(|net| start(net, false)));
-        drives.push(start(self.clk, true));
-        drives.push(Drive::new(RESET_END, self.resetb, true));
+    fn power_up(&self) -> Drives {
+        let pins = [self.stop, self.resetb, self.enable, self.load];
+        let mut drives = Drives::low(self.init.iter().copied().chain(pins));
+        drives.set(Time::ZERO, self.clk, true);
+        drives.set(RESET_END, self.resetb, true);
         drives
     }
 
     /// COUNTER_INIT at `time`, a pulse of MEMORY_LOAD after it, in which COUNTER_INIT moves on; returns the pulse's rise.
-    fn load(&self, drives: &mut Vec<Drive>, time: Time, start: u64) -> Time {
-        let value = self.config.load_codes(&[start as u16])[0];
-        self.show(drives, time, value);
+    fn load(&self, drives: &mut Drives, time: Time, start: u64) -> Time {
+        let code = u64::from(self.config.load_codes(&[start as u16])[0]);
+        drives.number(time, &self.init, code);
         let rise = time + Time::from_ns(2);
-        self.show(drives, rise + Time::from_ns(1), !value);
-        drives.push(Drive::new(rise, self.load, true));
-        drives.push(Drive::new(rise + Time::from_ns(2), self.load, false));
+        drives.number(rise + Time::from_ns(1), &self.init, !code);
+        drives.pulse(self.load, rise, rise + Time::from_ns(2));
         rise
-    }
-
-    /// COUNTER_INIT from `time` on.
-    fn show(&self, drives: &mut Vec<Drive>, time: Time, code: u16) {
-        let bit = |(i, &net): (usize, &NetId)| Drive::new(time, net, code >> i & 1 == 1);
-        drives.extend(self.init.iter().enumerate().map(bit));
     }
 
     /// The COUNTER_CLK edge that raises LOCAL_STOP, the first one being 0.
@@ -213,7 +196,7 @@ fn first_edge(config: &SensorConfig, start: u64) -> Option<i64> {
 }
 
 /// P-counter and timing block, connected as in a macropixel.
-fn circuit(config: &SensorConfig) -> Netlist {
+fn circuit(config: &SensorConfig) -> Rig {
     let mut m = ModuleBuilder::new("tb_p_counter");
     for pin in ["CLK", "STOP", "RESETB", "ENABLE"] {
         m.input(pin);
@@ -227,7 +210,7 @@ fn circuit(config: &SensorConfig) -> Netlist {
     let timing = p_counter_timing::circuit(config.after_borrow, config.reset_buffers());
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
-    Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"))
+    Rig::new(&finished(m), config.corner)
 }
 
 /// Counts changes to X.
@@ -270,34 +253,28 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         ),
     ];
     for cycle in 0..5 {
-        drives.push(Drive::new(stop(cycle), bench.stop, true));
-        let fall = origin + exposure.stop_fall(cycle);
-        drives.push(Drive::new(fall, bench.stop, false));
+        drives.pulse(bench.stop, stop(cycle), origin + exposure.stop_fall(cycle));
     }
     for (cycle, enabled) in [(0, true), (2, false), (3, true)] {
-        drives.push(Drive::new(stop(cycle), bench.enable, enabled));
+        drives.set(stop(cycle), bench.enable, enabled);
     }
     // CLK runs from the release of the reset on.
     let half_periods = 2 * (5 * stop_periods + hold_periods);
-    let clock_edges = clock(bench.clk, exposure.clock, origin, -BEFORE, half_periods);
-    drives.extend(clock_edges);
+    drives.clock(bench.clk, exposure.clock, origin, (-BEFORE, half_periods));
 
-    let mut stimulus = Stimulus::sorted(drives);
-    let mut kernel = bench.kernel();
-    let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
+    let rig = &bench.rig;
+    let (mut kernel, mut stimulus) = (rig.kernel(), drives.sorted());
+    let mut recorder = Recorder::new(rig.nets());
     let mut unknowns = Unknowns::default();
     let mut unknown_at_release = 0;
-    let view = view(&bench.netlist, stop(0), stop(5));
-    write_waves(waves, &bench.netlist, &view, |waves| {
-        kernel
-            .run(&mut stimulus, RESET_END, &mut (&mut recorder, &mut *waves))
-            .expect("no loop of cells without delay");
-        let nets = (0..bench.netlist.net_count()).map(NetId::new);
-        unknown_at_release = nets.filter(|&net| kernel.value(net) == Logic::X).count();
+    let view = view(&rig.netlist, stop(0), stop(5));
+    write_waves(waves, &rig.netlist, &view, |waves| {
+        let mut observers = (&mut recorder, &mut *waves);
+        rig::run(&mut kernel, &mut stimulus, RESET_END, &mut observers);
+        let is_unknown = |&net: &NetId| kernel.value(net) == Logic::X;
+        unknown_at_release = rig.nets().filter(is_unknown).count();
         let mut observers = ((&mut recorder, &mut unknowns), waves);
-        kernel
-            .run(&mut stimulus, end, &mut observers)
-            .expect("no loop of cells without delay");
+        rig::run(&mut kernel, &mut stimulus, end, &mut observers);
         end
     })?;
 
@@ -366,8 +343,8 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
             let found = edges.map(|&t| recorder.number_at(counter_out, t + half_period));
             checks.equal(
                 format!("cycle {cycle}: COUNTER_OUT after each rise of COUNTER_CLK"),
-                sequence(expected.map(Some)),
-                sequence(found),
+                in_a_row(expected),
+                in_a_row(found.map(number_text)),
             );
         }
         let mut found: Vec<Time> = local_stops.iter().filter(within).map(relative).collect();
@@ -458,122 +435,9 @@ fn view(netlist: &Netlist, first_stop: Time, last: Time) -> Layout {
         binary(Probe::LocalStop),
     ];
     let is_there = |entry: &Entry| netlist.signal(&entry.path).is_some();
-    Layout {
-        groups: vec![
-            SignalGroup::new("Global signals", inputs),
-            SignalGroup::new("P-counter (Fig. 54)", counter.into_iter().filter(is_there)),
-        ],
-        zoom: (Time::ZERO, last),
-        marker: Some(first_stop),
-        marks: Vec::new(),
-    }
-}
-
-/// Loads every start value and counts it out twice, the second time from a counter that has rolled over.
-fn every_start_value(bench: &Bench, checks: &mut Checks) {
-    const LOAD_PERIODS: i64 = 4;
-    const AFTER_BORROW: i64 = 3;
-    let (config, timing) = (&bench.config, &bench.timing);
-    let exposure = Exposure::new(config, 2, 1);
-    let falling_clk = |period: i64| bench.origin + exposure.falling(period);
-    let mut drives = bench.power_up();
-    let mut cycles = Vec::new();
-    let mut period = 0;
-    for start in 0..=config.largest_start() as i64 {
-        drives.push(Drive::new(falling_clk(period), bench.enable, false));
-        bench.load(&mut drives, falling_clk(period), start as u64);
-        period += LOAD_PERIODS;
-        drives.push(Drive::new(falling_clk(period), bench.enable, true));
-        for _ in 0..2 {
-            drives.push(Drive::new(falling_clk(period), bench.stop, true));
-            drives.push(Drive::new(falling_clk(period + 1), bench.stop, false));
-            let first = bench.first_edge(start as u64);
-            cycles.extend(first.map(|first| (first, period)));
-            period += first.unwrap_or(0) + AFTER_BORROW;
-        }
-    }
-    drives.extend(clock(
-        bench.clk,
-        exposure.clock,
-        bench.origin,
-        0,
-        2 * period,
-    ));
-    let counter_out = bench.inner.iter().flat_map(|[_, out]| out.iter().copied());
-    let mut recorder = Recorder::new(counter_out.chain([bench.local_stop]));
-    bench
-        .kernel()
-        .run(
-            &mut Stimulus::sorted(drives),
-            falling_clk(period),
-            &mut recorder,
-        )
-        .expect("no loop of cells without delay");
-
-    let mut rises = recorder.rising_edges(bench.local_stop);
-    if config.after_borrow == AfterBorrow::Wrap {
-        // Of each laser cycle the first: a short counter comes round before the next STOP.
-        let mut last = None;
-        let cycle_of = |t: &Time| cycles.partition_point(|&(_, stop)| falling_clk(stop) <= *t);
-        rises.retain(|rise| last.replace(cycle_of(rise)) != Some(cycle_of(rise)));
-    }
-    let expected = cycles.len();
-    let what = format!(
-        "start values 0 to {}, twice each: LOCAL_STOPs",
-        config.largest_start()
-    );
-    checks.equal(what, expected, rises.len());
-    let ripple =
-        |(&rise, &(first, stop)): (&Time, &(i64, i64))| rise - falling_clk(stop + first + 1);
-    let ripples: Vec<Time> = rises.iter().zip(&cycles).map(ripple).collect();
-    let what = "ripple, CLK fall start + 1 to LOCAL_STOP, of all";
-    bench.takes(what, checks, Time::ZERO, timing.ripple(), &ripples);
-    if bench.inner.is_none() {
-        return;
-    }
-    const PUBLISHED: Time = Time::from_ps(1200);
-    let worst = ripples.iter().copied().max().unwrap_or(Time::ZERO);
-    let off = (worst - PUBLISHED).as_s() / PUBLISHED.as_s();
-    let default = SensorConfig::default();
-    if (config.counter_bits, config.corner) == (default.counter_bits, default.corner) {
-        checks.add_verdict(
-            "worst ripple against the published one (4.6, Fig. 56)",
-            format!("{PUBLISHED} within 1 %"),
-            format!("{worst}, {:+.2} %", 100.0 * off),
-            off.abs() < 0.01,
-        );
-    }
-
-    // Outputs on their way back to the start value are edges for the next stage, too.
-    let last_change = |stop: i64| {
-        let stop = falling_clk(stop);
-        let changes = recorder.changes();
-        let until = changes.partition_point(|c| c.0 <= stop + exposure.clock.half_periods(1));
-        let back = changes[..until]
-            .iter()
-            .rev()
-            .find(|c| c.1 != bench.local_stop);
-        back.map_or(Time::ZERO, |c| (c.0 - stop).max(Time::ZERO))
-    };
-    let settled = cycles.iter().map(|&(_, stop)| last_change(stop)).max();
-    let settled = settled.unwrap_or(Time::MAX);
-    checks.add_verdict(
-        "latest change of COUNTER_OUT by a reset, after STOP",
-        format!(
-            "before {}, COUNTER_RESET's fall",
-            timing.stop_to_reset_release
-        ),
-        settled,
-        Time::ZERO < settled && settled < timing.stop_to_reset_release,
-    );
-}
-
-/// A number, or X.
-fn number_text(number: Option<u64>) -> String {
-    number.map_or("X".to_owned(), |n| n.to_string())
-}
-
-/// Numbers in a row.
-fn sequence(numbers: impl Iterator<Item = Option<u64>>) -> String {
-    numbers.map(number_text).collect::<Vec<_>>().join(" ")
+    let groups = vec![
+        SignalGroup::new("Global signals", inputs),
+        SignalGroup::new("P-counter (Fig. 54)", counter.into_iter().filter(is_there)),
+    ];
+    Layout::new(groups, (Time::ZERO, last), first_stop)
 }

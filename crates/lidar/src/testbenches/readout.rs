@@ -257,10 +257,5 @@ fn view(config: &SensorConfig, counted: Time) -> Layout {
             bins.chain(memory),
         ));
     }
-    Layout {
-        groups,
-        zoom: (counted - PAUSE, counted + word * 3),
-        marker: Some(counted),
-        marks: Vec::new(),
-    }
+    Layout::new(groups, (counted - PAUSE, counted + word * 3), counted)
 }

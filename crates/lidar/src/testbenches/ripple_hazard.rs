@@ -15,7 +15,6 @@
 //! The period at which the histogram moves is this netlist's own (twice strobe less clk-to-Q); it lies a little above
 //! twice the ripple, since the strobe's multiplexer and buffer take more time than the shift register's flip-flop.
 
-use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -24,7 +23,6 @@ use crate::chip::{
     CellLibrary, Exposure, Limits, Probe, Probes, SensorConfig, Silicon, array, probes,
 };
 use crate::engine::GateSimulation;
-use crate::engine::waveform::write_waves;
 use crate::files::InputError;
 use crate::kernel::{CheckReport, Policy, Recorder};
 use crate::logic::Logic;
@@ -32,6 +30,8 @@ use crate::netlist::{CheckKind, Corner, Mismatch, NetId, Netlist, ScopeId, Timin
 use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::{beside, record_exposure};
+use crate::testbenches::text::{in_a_row, number_text};
 use crate::units::{Frequency, Time};
 use crate::waves::{Entry, Layout, SignalGroup};
 
@@ -122,13 +122,12 @@ fn delays(netlist: &Netlist) -> Timing {
     timing
 }
 
-/// Exposes both macropixels at this CLK period; `waves` gets the waveform and `view` the netlist and time of each
-/// STOP edge.
+/// Exposes both macropixels at this CLK period. `shown` has the path of a waveform, and for its view which HITs see SHIFT before it
+/// changes.
 fn expose(
     period: Time,
     policy: Policy,
-    waves: Option<&Path>,
-    view: impl FnOnce(&dyn Fn(i64) -> Time) -> Layout,
+    shown: Option<(&Path, &[bool])>,
 ) -> Result<Outcome, InputError> {
     let bins = bins();
     let exposure = Exposure {
@@ -165,13 +164,12 @@ fn expose(
     let schedule = gate.schedule();
     let stop = |cycle: i64| schedule.origin + exposure.stop(cycle);
     let mut found = gate.timing_checks(policy);
-    match waves {
+    match shown {
         None => gate.run(&mut (&mut recorder, &mut found)),
-        Some(waves) => {
-            write_waves(waves, &netlist, &view(&stop), |waves| {
-                gate.run(&mut ((&mut recorder, &mut found), waves));
-                schedule.end
-            })?;
+        Some((waves, sees_old)) => {
+            let view = view(&stop, period, sees_old);
+            let mut observers = (&mut recorder, &mut found);
+            record_exposure(&mut gate, waves, &view, &mut observers)?;
         }
     }
     let captured = |probes: &Probes| {
@@ -208,13 +206,7 @@ fn expose(
 
 /// Without a waveform.
 fn outcome(period: Time, policy: Policy) -> Outcome {
-    let view = |_: &dyn Fn(i64) -> Time| Layout {
-        groups: Vec::new(),
-        zoom: (Time::ZERO, Time::ZERO),
-        marker: None,
-        marks: Vec::new(),
-    };
-    expose(period, policy, None, view).expect("no file is written")
+    expose(period, policy, None).expect("no file is written")
 }
 
 /// What the right capture counts, and what one that is a period late does.
@@ -226,9 +218,8 @@ fn expected(is_late: bool) -> Vec<Option<u64>> {
         .collect()
 }
 
-fn counts_text<T: Debug>(counts: &[Option<T>]) -> String {
-    let count = |c: &Option<T>| c.as_ref().map_or("X".to_owned(), |n| format!("{n:?}"));
-    counts.iter().map(count).collect::<Vec<_>>().join(" ")
+fn counts_text(counts: &[Option<u64>]) -> String {
+    in_a_row(counts.iter().copied().map(number_text))
 }
 
 /// Right at 384 MHz, and moved by exactly one bin at 438 MHz: no check is broken in either.
@@ -304,8 +295,7 @@ fn hits_between() -> (Time, Vec<bool>) {
 fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let (period, sees_old) = hits_between();
     let bins = bins();
-    let look = |stop: &dyn Fn(i64) -> Time| view(stop, period, &sees_old);
-    let found = expose(period, Policy::ReportOnly, Some(waves), look)?;
+    let found = expose(period, Policy::ReportOnly, Some((waves, &sees_old)))?;
     let predicted: Vec<Option<u64>> = expected(false)
         .iter()
         .zip(expected(true))
@@ -333,12 +323,8 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
         (bins.len()..=2 * bins.len()).contains(&violated),
     );
 
-    let name = "tb_ripple_hazard_x";
-    let with_x = waves
-        .with_file_name(name)
-        .with_extension(waves.extension().unwrap_or_default());
-    let look = |stop: &dyn Fn(i64) -> Time| view(stop, period, &sees_old);
-    let found = expose(period, Policy::XOnViolation, Some(&with_x), look)?;
+    let with_x = beside(waves, "tb_ripple_hazard_x");
+    let found = expose(period, Policy::XOnViolation, Some((&with_x, &sees_old)))?;
     let captured = &found.pixels[1];
     checks.equal(
         format!("{period}, mp_r0_c1, checks x: laser cycles with an unknown HIT"),
@@ -347,7 +333,7 @@ fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> 
     );
     checks.equal(
         format!("{period}, mp_r0_c1, checks x: counts"),
-        counts_text::<u64>(&vec![None; config().bins]),
+        counts_text(&vec![None; config().bins]),
         counts_text(&captured.counts),
     );
     Ok(())
@@ -384,10 +370,5 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
         let title = format!("{pixel}: {title} (Fig. 56)");
         groups.push(SignalGroup::new(title, signals.into_iter().chain(bins)));
     }
-    Layout {
-        groups,
-        zoom: (strobe - period, strobe + period),
-        marker: Some(strobe),
-        marks: Vec::new(),
-    }
+    Layout::new(groups, (strobe - period, strobe + period), strobe)
 }

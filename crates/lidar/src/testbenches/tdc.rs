@@ -21,9 +21,10 @@ use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
 use crate::files::InputError;
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
 use crate::logic::Logic;
-use crate::netlist::{CellId, CellKind, Netlist, Timing};
+use crate::netlist::{CellId, CellKind};
 use crate::report::{Axis, Chart, Checks, Grid};
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::Rig;
 use crate::units::{Frequency, Time};
 use rand_philox::{philox4x32_10, u32_to_unit_f64};
 
@@ -60,8 +61,7 @@ struct Tdc {
     name: &'static str,
     /// Of its intervals.
     seed: u32,
-    netlist: Netlist,
-    timing: Timing,
+    rig: Rig,
     code: &'static str,
     common: Common,
     clock: Option<Frequency>,
@@ -72,13 +72,12 @@ struct Tdc {
 }
 
 fn clocked() -> Tdc {
-    let (netlist, timing) = build(&clock_counter::circuit(BITS), SIGMA, 1);
+    let rig = build(&clock_counter::circuit(BITS), SIGMA, 1);
     let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
     Tdc {
         name: "clock counter",
         seed: 1,
-        netlist,
-        timing,
+        rig,
         code: "CODE",
         common: Common::Stop,
         clock: Some(clock),
@@ -88,8 +87,8 @@ fn clocked() -> Tdc {
 }
 
 fn ring() -> Tdc {
-    let (netlist, timing) = build(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
-    let model = ring_oscillator::RingOscillatorModel::from_netlist(&netlist, &timing, "");
+    let rig = build(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
+    let model = ring_oscillator::RingOscillatorModel::from_netlist(&rig.netlist, &rig.timing, "");
     Tdc {
         name: "ring oscillator",
         seed: 2,
@@ -98,14 +97,13 @@ fn ring() -> Tdc {
         clock: None,
         steps: model.steps(CODES),
         range: model.period * CODES as i64,
-        netlist,
-        timing,
+        rig,
     }
 }
 
 fn line() -> Tdc {
-    let (netlist, timing) = build(&delay_line::circuit(CODES), SIGMA, 1);
-    let steps = delay_line::model(&netlist, &timing, "");
+    let rig = build(&delay_line::circuit(CODES), SIGMA, 1);
+    let steps = delay_line::model(&rig.netlist, &rig.timing, "");
     Tdc {
         name: "delay line",
         seed: 3,
@@ -114,8 +112,7 @@ fn line() -> Tdc {
         clock: None,
         range: *steps.edges().last().expect("it has elements") + Time::from_ps(40),
         steps,
-        netlist,
-        timing,
+        rig,
     }
 }
 
@@ -140,12 +137,12 @@ impl Tdc {
     /// When NOT CLK rises in a stretch of time.
     fn samples(&self, from: Time, to: Time) -> impl Iterator<Item = Time> {
         let clock = self.clock.expect("it has a clock");
-        let cells = self.netlist.cells().iter();
+        let cells = self.rig.netlist.cells().iter();
         let mut inverters = cells
             .enumerate()
             .filter(|(_, cell)| cell.kind == CellKind::Inv);
         let (inverter, _) = inverters.next().expect("it inverts CLK");
-        let late = self.timing.cell_delays(CellId::new(inverter))[0][0].rise();
+        let late = self.rig.timing.cell_delays(CellId::new(inverter))[0][0].rise();
         let first = (from.as_s() * clock.as_hz()) as i64 - 2;
         let falls = (first..).map(move |k| clock.half_periods(2 * k + 1) + late);
         falls.take_while(move |&fall| fall < to)
@@ -153,11 +150,10 @@ impl Tdc {
 
     /// The code test, and each code against the model.
     fn density(&self, checks: &mut Checks) -> Density {
-        let input = |name: &str| self.netlist.net(name).expect("it is an input");
-        let (start, stop, clear) = (input("START"), input("STOP"), input("TDC_RESET"));
-        let code = self.netlist.signal(self.code).expect("it is an output");
+        let [start, stop, clear] = ["START", "STOP", "TDC_RESET"].map(|pin| self.rig.net(pin));
+        let code = self.rig.bus(self.code);
         let (clock, periods) = self.slots();
-        let mut kernel = LaneKernel::new(&self.netlist, &self.timing);
+        let mut kernel = LaneKernel::new(&self.rig.netlist, &self.rig.timing);
         let all = |time, net, level: bool| LaneDrive {
             time,
             net,
@@ -197,7 +193,7 @@ impl Tdc {
                 }));
             }
             if self.clock.is_some() {
-                let clk = input("CLK");
+                let clk = self.rig.net("CLK");
                 let edges = 2 * first..2 * last;
                 drives.extend(edges.map(|k| all(clock.half_periods(k), clk, k % 2 == 0)));
             }
@@ -258,6 +254,7 @@ fn table(converters: &[Tdc], densities: &[Density]) -> String {
     for (tdc, density) in converters.iter().zip(densities) {
         let (expected, found) = (tdc.expected(), &density.linearity);
         let transistors = tdc
+            .rig
             .netlist
             .cells()
             .iter()

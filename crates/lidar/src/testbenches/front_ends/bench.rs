@@ -1,9 +1,10 @@
 //! All front ends on the same SPADs, and what each counts in a light.
 
 use crate::chip::{FrontEnd, SensorConfig, front_end};
-use crate::kernel::{Drive, Kernel, Observer, Stimulus};
+use crate::kernel::Observer;
 use crate::logic::Logic;
-use crate::netlist::{Corner, Library, ModuleBuilder, NetId, Netlist, Timing};
+use crate::netlist::{Corner, ModuleBuilder, NetId};
+use crate::testbenches::rig::{Drives, Rig, finished};
 use crate::theory::front_ends::non_paralysable_hz;
 use crate::units::{Frequency, Time};
 use crate::waves::{Entry, Layout, SignalGroup};
@@ -24,8 +25,7 @@ pub(super) const BEGIN: Time = Time::from_ns(20);
 /// All front ends on the same SPADs.
 pub(super) struct Bench {
     pub(super) config: SensorConfig,
-    pub(super) netlist: Netlist,
-    timing: Timing,
+    pub(super) rig: Rig,
 }
 
 impl Bench {
@@ -47,11 +47,9 @@ impl Bench {
             let ports = [("SPAD_TIMED", &timed[..])];
             m.instance_by_names(kind.name(), &front_end::circuit(&config), &ports);
         }
-        let netlist = Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"));
         Bench {
-            timing: Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ),
             config: config(FrontEnd::OrTree),
-            netlist,
+            rig: Rig::new(&finished(m), Corner::Typ),
         }
     }
 
@@ -59,13 +57,10 @@ impl Bench {
         self.config.clock()
     }
 
-    /// Pulses of all SPADs in this light from `BEGIN` to `end`, as drives.
-    fn pulses(&self, photons_hz: f64, end: Time) -> Vec<Drive> {
-        let raw = self.netlist.signal("SPAD_RAW").expect("it has SPADs");
+    /// Pulses of all SPADs in this light from `BEGIN` to `end`.
+    fn drive_pulses(&self, drives: &mut Drives, photons_hz: f64, end: Time) {
         let dead = self.config.dead_time();
-        let mut drives = Vec::new();
-        for (spad, &net) in (0..).zip(&raw) {
-            drives.push(Drive::new(Time::ZERO, net, false));
+        for (spad, net) in (0..).zip(self.rig.bus("SPAD_RAW")) {
             // A SPAD that has been lit for long is as likely to be dead as ever: the first pulses are drawn, not driven.
             let mut time = BEGIN - dead * 20;
             for number in 0.. {
@@ -78,32 +73,23 @@ impl Bench {
                     break;
                 }
                 if time >= BEGIN {
-                    drives.push(Drive::new(time, net, true));
-                    drives.push(Drive::new(time + dead, net, false));
+                    drives.pulse(net, time, time + dead);
                 }
                 time += dead;
             }
         }
-        drives
     }
 
     /// Runs all front ends until `end`.
     pub(super) fn simulate(&self, photons_hz: f64, end: Time, observer: &mut dyn Observer) {
-        let input = |name: &str| self.netlist.net(name).expect("it is an input");
-        let (clk, clear) = (input("CLK"), input("PIXEL_CLEAR"));
-        let mut drives = self.pulses(photons_hz, end);
-        drives.push(Drive::new(Time::ZERO, clear, true));
-        drives.push(Drive::new(BEGIN - Time::from_ns(2), clear, false));
+        let mut drives = Drives::low(self.rig.bus("SPAD_RAW"));
+        self.drive_pulses(&mut drives, photons_hz, end);
+        let cleared = BEGIN - Time::from_ns(2);
+        drives.pulse(self.rig.net("PIXEL_CLEAR"), Time::ZERO, cleared);
         let ticks = self.clock().ticks(0).take_while(|&tick| tick < end);
-        drives.extend(
-            (0..)
-                .zip(ticks)
-                .map(|(k, tick)| Drive::new(tick, clk, k % 2 == 1)),
-        );
-        let mut kernel = Kernel::new(&self.netlist, &self.timing);
-        kernel
-            .run(&mut Stimulus::sorted(drives), end, observer)
-            .expect("no loop of cells without delay");
+        let edges = (0, ticks.count() as i64);
+        drives.clock(self.rig.net("CLK"), self.clock(), Time::ZERO, edges);
+        self.rig.run(drives, end, observer);
     }
 
     /// Counts of all front ends in this light.
@@ -165,10 +151,9 @@ struct Counter {
 
 impl Counter {
     fn new(bench: &Bench) -> Self {
-        let netlist = &bench.netlist;
-        let mut roles = vec![None; netlist.net_count()];
+        let mut roles = vec![None; bench.rig.netlist.net_count()];
         let mut watch = |path: &str, role| {
-            for net in netlist.signal(path).expect("it was built above") {
+            for net in bench.rig.bus(path) {
                 roles[net.index()] = Some(role);
             }
         };
@@ -227,31 +212,27 @@ pub(super) fn view() -> Layout {
     let group = |title: &str, kind, names| {
         SignalGroup::new(title, inside(kind, names).into_iter().chain([timed(kind)]))
     };
-    Layout {
-        groups: vec![
-            SignalGroup::new(
-                "SPADs and clock",
-                [Entry::hex("SPAD_RAW"), Entry::binary("CLK")],
-            ),
-            group(
-                "(a) Pulse shapers, OR tree",
-                FrontEnd::OrTree,
-                &["SHAPED", "WIRE", "joined.TOGGLE"],
-            ),
-            group(
-                "(b) Toggles, XOR tree",
-                FrontEnd::XorTree,
-                &["TOGGLES", "WIRE"],
-            ),
-            group(
-                "(c) Coincidence, 2 of 16",
-                FrontEnd::Coincidence,
-                &["SHAPED", "WIRE", "joined.TOGGLE"],
-            ),
-            group("(d) Synchronous summation", FrontEnd::Summation, &[]),
-        ],
-        zoom: (BEGIN, BEGIN + Time::from_ns(40)),
-        marker: Some(BEGIN),
-        marks: Vec::new(),
-    }
+    let groups = vec![
+        SignalGroup::new(
+            "SPADs and clock",
+            [Entry::hex("SPAD_RAW"), Entry::binary("CLK")],
+        ),
+        group(
+            "(a) Pulse shapers, OR tree",
+            FrontEnd::OrTree,
+            &["SHAPED", "WIRE", "joined.TOGGLE"],
+        ),
+        group(
+            "(b) Toggles, XOR tree",
+            FrontEnd::XorTree,
+            &["TOGGLES", "WIRE"],
+        ),
+        group(
+            "(c) Coincidence, 2 of 16",
+            FrontEnd::Coincidence,
+            &["SHAPED", "WIRE", "joined.TOGGLE"],
+        ),
+        group("(d) Synchronous summation", FrontEnd::Summation, &[]),
+    ];
+    Layout::new(groups, (BEGIN, BEGIN + Time::from_ns(40)), BEGIN)
 }

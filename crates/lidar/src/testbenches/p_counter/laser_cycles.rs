@@ -5,7 +5,7 @@
 
 use super::{BEFORE, Bench};
 use crate::chip::Exposure;
-use crate::kernel::{Drive, Recorder, Stimulus, clock};
+use crate::kernel::Recorder;
 use crate::report::Checks;
 use crate::units::Time;
 
@@ -27,33 +27,20 @@ pub(super) fn count_alike(bench: &Bench, checks: &mut Checks) {
     let exposure = Exposure::new(&bench.config, stop_periods as u32, CYCLES as u32);
     let mut drives = bench.power_up();
     bench.load(&mut drives, Time::from_ns(5), start);
-    drives.push(Drive::new(origin, bench.enable, true));
+    drives.set(origin, bench.enable, true);
     for cycle in 0..CYCLES {
         let stop = origin + exposure.stop(cycle);
-        drives.push(Drive::new(stop, bench.stop, true));
-        drives.push(Drive::new(
-            origin + exposure.stop_fall(cycle),
-            bench.stop,
-            false,
-        ));
+        drives.pulse(bench.stop, stop, origin + exposure.stop_fall(cycle));
         // In the middle of a CLK period, every bit now and then.
         let code = (cycle as u16).wrapping_mul(0x9e37) >> 3;
-        bench.show(&mut drives, stop + exposure.clock.half_periods(3), code);
+        let time = stop + exposure.clock.half_periods(3);
+        drives.number(time, &bench.init, u64::from(code));
     }
     let end = origin + exposure.stop(CYCLES);
     let half_periods = 2 * CYCLES * stop_periods;
-    drives.extend(clock(
-        bench.clk,
-        exposure.clock,
-        origin,
-        -BEFORE,
-        half_periods,
-    ));
+    drives.clock(bench.clk, exposure.clock, origin, (-BEFORE, half_periods));
     let mut recorder = Recorder::new([bench.local_stop]);
-    bench
-        .kernel()
-        .run(&mut Stimulus::sorted(drives), end, &mut recorder)
-        .expect("no loop of cells without delay");
+    bench.rig.run(drives, end, &mut recorder);
 
     let rises = recorder.rising_edges(bench.local_stop);
     let mut after = Vec::new();

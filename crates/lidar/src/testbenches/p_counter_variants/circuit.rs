@@ -1,9 +1,7 @@
 //! What the circuits of this testbench have in common: when they start, and a P-counter with its timing block.
 
-use std::sync::Arc;
-
 use crate::chip::{SensorConfig, p_counter, p_counter_timing};
-use crate::netlist::{Module, ModuleBuilder, Net};
+use crate::netlist::{ModuleBuilder, Net};
 use crate::units::Time;
 
 /// First STOP edge.
@@ -23,9 +21,4 @@ pub(super) fn place_counter(m: &mut ModuleBuilder, config: &SensorConfig) -> Net
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     counter_reset
-}
-
-/// The module of a builder.
-pub(super) fn finished(m: ModuleBuilder) -> Arc<Module> {
-    m.finish().expect("the testbench's circuit is whole")
 }

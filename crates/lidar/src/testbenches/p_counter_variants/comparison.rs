@@ -4,9 +4,10 @@ use crate::analysis::{MacropixelTiming, gate_works, ripple, shortest_period};
 use crate::chip::{
     Limits, PCounter, Probe, Probes, SensorConfig, Silicon, macropixel, p_counter, p_counter_timing,
 };
-use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
+use crate::kernel::Recorder;
 use crate::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
 use crate::report::{Checks, Grid};
+use crate::testbenches::rig::Rig;
 use crate::units::Time;
 
 /// Longest CLK period that is tried.
@@ -107,12 +108,14 @@ impl Row {
         let area: u64 = blocks.iter().map(|b| b.area()).sum();
         let netlist = Netlist::elaborate(&blocks[0]);
         let timing = TYPICAL.timing(&netlist);
-        let clk = Probes::of_block(&netlist).net(Probe::CounterClk);
-        let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(clk, Edge::Rise)], &[]);
+        let rig = Rig { netlist, timing };
+        let clk = Probes::of_block(&rig.netlist).net(Probe::CounterClk);
+        let paths = StaticTiming::new(&rig.netlist, &rig.timing);
+        let arrivals = paths.arrivals(&[(clk, Edge::Rise)], &[]);
         let arrivals = arrivals.expect("a P-counter has no loop");
-        let nets = (0..netlist.net_count()).map(NetId::new);
-        let settled = nets.filter_map(|net| arrivals.window(net)).map(|w| w.1);
-        let activity = Activity::simulate(&config, &netlist);
+        let windows = rig.nets().filter_map(|net| arrivals.window(net));
+        let settled = windows.map(|window| window.1);
+        let activity = Activity::simulate(&config, &rig);
         let by_paths = MacropixelTiming::analyse(&config, &TYPICAL, Limits::Ignored, (0, 0));
         let ripple = ripple(&config, &TYPICAL);
         Row {
@@ -214,40 +217,30 @@ struct Activity {
 impl Activity {
     /// Counts slowly from start value 0, which a rippling up counter passes through at every power of two, until the
     /// count has come round.
-    fn simulate(config: &SensorConfig, netlist: &Netlist) -> Self {
+    fn simulate(config: &SensorConfig, rig: &Rig) -> Self {
         const GAP: Time = Time::from_ns(10);
-        let pin = |name| netlist.net(name).expect("a net of the P-counter");
         let counts = usize::from(config.largest_start()) + 3;
-        let pulses = [
+        let inputs = rig.netlist.inputs();
+        let mut drives = rig.power_up();
+        for (name, rise, fall) in [
             ("MEMORY_RESET", 0, 1),
             ("COUNTER_RESET", 0, 5),
             ("MEMORY_LOAD", 3, 4),
-        ];
-        let inputs = netlist.inputs();
-        let mut drives: Vec<Drive> = inputs
-            .iter()
-            .map(|&net| Drive::new(Time::ZERO, net, false))
-            .collect();
-        for (name, rise, fall) in pulses {
-            drives.push(Drive::new(GAP * rise, pin(name), true));
-            drives.push(Drive::new(GAP * fall, pin(name), false));
+        ] {
+            drives.pulse(rig.net(name), GAP * rise, GAP * fall);
         }
+        let clk = rig.net("COUNTER_CLK");
         let edge = |count: usize| GAP * (count as i64 + 10);
         for count in 0..counts {
-            drives.push(Drive::new(edge(count), pin("COUNTER_CLK"), true));
-            let fall = edge(count) + Time::from_ns(5);
-            drives.push(Drive::new(fall, pin("COUNTER_CLK"), false));
+            drives.pulse(clk, edge(count), edge(count) + Time::from_ns(5));
         }
-        let mut recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
-        let mut kernel = Kernel::new(netlist, &TYPICAL.timing(netlist));
-        kernel
-            .run(&mut Stimulus::sorted(drives), edge(counts), &mut recorder)
-            .expect("no loop of cells without delay");
+        let mut recorder = Recorder::new(rig.nets());
+        rig.run(drives, edge(counts), &mut recorder);
 
-        let probes = Probes::of_block(netlist);
+        let probes = Probes::of_block(&rig.netlist);
         let local_stop = probes.net(Probe::LocalStop);
         let compares = config.p_counter == PCounter::Comparator;
-        let equal = compares.then(|| pin(config.p_counter.row().nets[0]));
+        let equal = compares.then(|| rig.net(config.p_counter.row().nets[0]));
         let mut activity = Activity {
             counts,
             changes: 0,
@@ -261,7 +254,7 @@ impl Activity {
             let all = recorder.changes();
             let from = all.partition_point(|c| c.0 < within.start);
             let until = all.partition_point(|c| c.0 < within.end);
-            let mut changes = vec![0usize; netlist.net_count()];
+            let mut changes = vec![0usize; rig.netlist.net_count()];
             for &(time, net, _) in all[from..until].iter().filter(|c| !inputs.contains(&c.1)) {
                 changes[net.index()] += 1;
                 activity.settled = activity.settled.max(time - within.start);

@@ -4,10 +4,10 @@ use crate::chip::{ChipTiming, Exposure, PCounter, Probe};
 use crate::engine::GateSimulation;
 use crate::kernel::Recorder;
 use crate::report::Checks;
+use crate::testbenches::text::in_a_row;
 use crate::units::Time;
 
 use super::comparison::sensor;
-use super::text::numbers;
 
 /// The P-counter without memory: STOP every 512 CLK periods, and eight too many.
 pub(super) fn coming_round(checks: &mut Checks) {
@@ -44,7 +44,7 @@ pub(super) fn coming_round(checks: &mut Checks) {
             let what = format!(
                 "memoryless, STOP every {stop_periods}, start {start}: CLK fall of each LOCAL_STOP"
             );
-            checks.equal(what, numbers(&expected), numbers(&found));
+            checks.equal(what, in_a_row(&expected), in_a_row(&found));
             if stop_periods == round {
                 let last = recorder.number_at(&count, gate.schedule().end);
                 let what = format!(

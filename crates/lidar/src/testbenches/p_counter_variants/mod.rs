@@ -16,23 +16,22 @@ mod circuit;
 mod comparison;
 mod memoryless;
 mod side_by_side;
-mod text;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use self::circuit::{ORIGIN, RESET_END, finished, place_counter};
-use self::text::{listed, numbers};
+use self::circuit::{ORIGIN, RESET_END, place_counter};
 use crate::chip::{
-    AfterBorrow, CellLibrary, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc,
+    AfterBorrow, ChipTiming, Exposure, Irregular, Probe, SensorConfig, Tap, WindowLaw,
+    WindowOutcome, metdc,
 };
-use crate::chip::{Irregular, WindowOutcome};
-use crate::engine::waveform::write_waves;
 use crate::files::{InputError, OutputFile};
-use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
-use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
+use crate::kernel::Recorder;
+use crate::netlist::{Module, ModuleBuilder};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
+use crate::testbenches::rig::{Drives, Rig, finished};
+use crate::testbenches::text::{in_a_row, listed};
 use crate::units::Time;
 use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
@@ -144,7 +143,7 @@ fn channel(name: &str, config: &SensorConfig) -> Arc<Module> {
 
 /// The four channels side by side, and their clocks.
 struct Bench {
-    netlist: Netlist,
+    rig: Rig,
     exposure: Exposure,
 }
 
@@ -160,19 +159,9 @@ impl Bench {
             m.instance_by_names(name, &channel(name, &config(tap, after_borrow)), &[]);
         }
         Bench {
-            netlist: Netlist::elaborate(&finished(m)),
+            rig: Rig::new(&finished(m), SensorConfig::default().corner),
             exposure: Exposure::new(&SensorConfig::default(), 2, 1),
         }
-    }
-
-    fn pin(&self, name: &str) -> NetId {
-        self.netlist.net(name).expect("a pin of the testbench")
-    }
-
-    fn bus(&self, path: &str) -> Vec<NetId> {
-        self.netlist
-            .signal(path)
-            .expect("a signal of the testbench")
     }
 
     /// Falling CLK edge `period`, with which STOP rises.
@@ -180,66 +169,44 @@ impl Bench {
         ORIGIN + self.exposure.falling(period)
     }
 
-    fn drives(&self) -> Vec<Drive> {
-        let inputs = self.netlist.inputs().into_iter();
-        let mut drives: Vec<Drive> = inputs.map(|n| Drive::new(Time::ZERO, n, false)).collect();
-        let mut edges = vec![
-            (Time::ZERO, "CLK", true),
-            (Time::ZERO, "PIXEL_CLEAR", true),
-            (RESET_END, "RESETB", true),
-            (RESET_END, "PIXEL_CLEAR", false),
-        ];
+    fn drives(&self) -> Drives {
+        let rig = &self.rig;
+        let clk = |period| self.falling_clk(period);
+        let mut drives = rig.power_up();
+        drives.set(Time::ZERO, rig.net("CLK"), true);
+        drives.set(RESET_END, rig.net("RESETB"), true);
+        drives.pulse(rig.net("PIXEL_CLEAR"), Time::ZERO, RESET_END);
         for scene in [&HIGH, &SLOW_LASER] {
-            let load = self.falling_clk(scene.from) - Time::from_ns(15);
-            for (bit, &net) in self.bus("COUNTER_INIT").iter().enumerate() {
-                drives.push(Drive::new(load, net, scene.start >> bit & 1 == 1));
-            }
-            edges.push((load + Time::from_ns(2), "MEMORY_LOAD", true));
-            edges.push((load + Time::from_ns(4), "MEMORY_LOAD", false));
-            edges.push((self.falling_clk(scene.from), "ENABLE", true));
-            edges.push((self.falling_clk(scene.end()), "ENABLE", false));
-            for cycle in 0..=scene.cycles {
-                let stop = scene.stop(cycle);
-                edges.push((self.falling_clk(stop), "STOP", true));
-                edges.push((self.falling_clk(stop + 10), "STOP", false));
-                edges.push((self.falling_clk(stop - 10), "HIT_CLEAR", true));
-                edges.push((self.falling_clk(stop - 9), "HIT_CLEAR", false));
+            let load = clk(scene.from) - Time::from_ns(15);
+            drives.number(load, &rig.bus("COUNTER_INIT"), scene.start as u64);
+            let rise = load + Time::from_ns(2);
+            drives.pulse(rig.net("MEMORY_LOAD"), rise, rise + Time::from_ns(2));
+            drives.pulse(rig.net("ENABLE"), clk(scene.from), clk(scene.end()));
+            for stop in (0..=scene.cycles).map(|cycle| scene.stop(cycle)) {
+                drives.pulse(rig.net("STOP"), clk(stop), clk(stop + 10));
+                drives.pulse(rig.net("HIT_CLEAR"), clk(stop - 10), clk(stop - 9));
             }
             for edge in events(scene) {
-                edges.push((self.falling_clk(edge), "SPAD_EVENT", true));
-                edges.push((self.falling_clk(edge + 1), "SPAD_EVENT", false));
+                drives.pulse(rig.net("SPAD_EVENT"), clk(edge), clk(edge + 1));
             }
         }
-        let edges = edges.into_iter();
-        drives.extend(edges.map(|(time, name, value)| Drive::new(time, self.pin(name), value)));
-        let half_periods = 2 * (SLOW_LASER.end() + 40);
-        let clk = self.pin("CLK");
-        drives.extend(clock(clk, self.exposure.clock, ORIGIN, 0, half_periods));
+        let half_periods = (0, 2 * (SLOW_LASER.end() + 40));
+        drives.clock(rig.net("CLK"), self.exposure.clock, ORIGIN, half_periods);
         drives
     }
 
     /// Runs both scenes, with their waveform in `waves`.
     fn simulate(&self, waves: &Path) -> Result<Recorder, InputError> {
         let nets = CHANNELS.iter().flat_map(|(name, ..)| {
-            let local_stop = self.bus(&Probe::LocalStop.path(name));
-            let hits = METDCS.map(|metdc| self.bus(&Probe::Hit.path(&format!("{name}.{metdc}"))));
+            let local_stop = self.rig.bus(&Probe::LocalStop.path(name));
+            let hits =
+                METDCS.map(|metdc| self.rig.bus(&Probe::Hit.path(&format!("{name}.{metdc}"))));
             hits.into_iter().chain([local_stop])
         });
         let mut recorder = Recorder::new(nets.flatten());
-        let corner = SensorConfig::default().corner;
-        let timing = Timing::nominal(&self.netlist, CellLibrary::BUILT_IN.cells(), corner);
-        let mut kernel = Kernel::new(&self.netlist, &timing);
         let end = self.falling_clk(SLOW_LASER.end() + 40);
-        write_waves(waves, &self.netlist, &self.view(), |waves| {
-            kernel
-                .run(
-                    &mut Stimulus::sorted(self.drives()),
-                    end,
-                    &mut (&mut recorder, waves),
-                )
-                .expect("no loop of cells without delay");
-            end
-        })?;
+        let drives = self.drives();
+        (self.rig).record(waves, &self.view(), drives, end, &mut recorder)?;
         Ok(recorder)
     }
 
@@ -277,7 +244,7 @@ impl Bench {
     /// Rises of LOCAL_STOP in a scene, from its first STOP edge; the load's own are left out.
     fn rises(&self, seen: &Recorder, channel: &str, scene: &Scene) -> Vec<Time> {
         let from = self.falling_clk(scene.from);
-        let rises = seen.rising_edges(self.bus(&Probe::LocalStop.path(channel))[0]);
+        let rises = seen.rising_edges(self.rig.bus(&Probe::LocalStop.path(channel))[0]);
         let within = rises
             .into_iter()
             .filter(|&t| t > from && t < self.falling_clk(scene.end() + 10));
@@ -289,7 +256,7 @@ impl Bench {
         let within = |t: &Time| {
             (self.falling_clk(scene.from)..self.falling_clk(scene.end() + 10)).contains(t)
         };
-        let hit = self.bus(&Probe::Hit.path(metdc));
+        let hit = self.rig.bus(&Probe::Hit.path(metdc));
         let rises = hit.iter().map(|&net| seen.rising_edges(net));
         rises
             .map(|times| times.iter().filter(|t| within(t)).count())
@@ -365,12 +332,12 @@ fn false_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
         let found = bench.counts(seen, &format!("{channel}.metdc"), scene);
         checks.equal(
             format!("{channel}, start {start}: counted, bin by bin"),
-            numbers(counts),
-            numbers(&found),
+            in_a_row(counts),
+            in_a_row(&found),
         );
         let found = bench.counts(seen, &format!("{channel}.metdc_early"), scene);
         let what = format!("{channel}, start {start}: counted where HIT is not in reset at STOP");
-        checks.equal(what, numbers(early), numbers(&found));
+        checks.equal(what, in_a_row(early), in_a_row(&found));
     }
     let arrival = at_reset + timing.local_stop_to_strobe;
     checks.add_verdict(

@@ -2,19 +2,17 @@
 
 use std::path::Path;
 
-use crate::chip::{
-    CellLibrary, ChipTiming, Exposure, PCounter, Probe, Probes, SensorConfig, p_counter,
-};
-use crate::engine::waveform::write_waves;
+use crate::chip::{ChipTiming, Exposure, PCounter, Probe, Probes, SensorConfig, p_counter};
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Recorder, Stimulus, clock};
-use crate::netlist::{ModuleBuilder, NetId, Netlist, Timing};
+use crate::kernel::Recorder;
+use crate::netlist::{ModuleBuilder, Netlist};
 use crate::report::Checks;
+use crate::testbenches::rig::{Drives, Rig, beside, finished};
+use crate::testbenches::text::{in_a_row, listed};
 use crate::units::Time;
 use crate::waves::{Entry, Layout, SignalGroup};
 
-use super::circuit::{ORIGIN, RESET_END, finished, place_counter};
-use super::text::{listed, numbers};
+use super::circuit::{ORIGIN, RESET_END, place_counter};
 
 const START: u16 = 5;
 /// Bits of the counters, and CLK periods of a laser cycle, after which the counter without memory comes round.
@@ -30,7 +28,7 @@ fn config(p_counter: PCounter) -> SensorConfig {
     }
 }
 
-fn circuit() -> Netlist {
+fn circuit() -> Rig {
     let mut top = ModuleBuilder::new("tb_p_counters");
     for pin in PINS {
         top.input(pin);
@@ -44,33 +42,23 @@ fn circuit() -> Netlist {
         place_counter(&mut m, &config(p_counter));
         top.instance_by_names(p_counter.name(), &finished(m), &[]);
     }
-    Netlist::elaborate(&finished(top))
+    Rig::new(&finished(top), SensorConfig::default().corner)
 }
 
 /// Loads [`START`] and counts through the laser cycles; leaves the waveform `tb_p_counters` beside `waves`.
 pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    let netlist = circuit();
+    let rig = circuit();
     let exposure = Exposure::new(&config(PCounter::ALL[0]), STOP_PERIODS, CYCLES);
     let fall = |period: i64| ORIGIN + exposure.falling(period);
     let end = fall(exposure.stop_periods as i64 * i64::from(CYCLES));
-    let mut recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
-    let corner = SensorConfig::default().corner;
-    let timing = Timing::nominal(&netlist, CellLibrary::BUILT_IN.cells(), corner);
-    let mut kernel = Kernel::new(&netlist, &timing);
-    let file = waves
-        .with_file_name("tb_p_counters")
-        .with_extension(waves.extension().unwrap_or_default());
-    write_waves(&file, &netlist, &view(&netlist, end), |waves| {
-        let mut drives = Stimulus::sorted(drives(&netlist, &exposure));
-        kernel
-            .run(&mut drives, end, &mut (&mut recorder, waves))
-            .expect("no loop of cells without delay");
-        end
-    })?;
+    let mut recorder = Recorder::new(rig.nets());
+    let file = beside(waves, "tb_p_counters");
+    let drives = drives(&rig, &exposure);
+    rig.record(&file, &view(&rig.netlist, end), drives, end, &mut recorder)?;
 
     for p_counter in PCounter::ALL {
         let (name, config) = (p_counter.name(), config(p_counter));
-        let probes = Probes::below_instance(&netlist, name);
+        let probes = Probes::below_instance(&rig.netlist, name);
         let is_reset = p_counter.row().has_memory;
         let first = i64::from(START) + i64::from(is_reset);
         let edges = (first..).step_by(STOP_PERIODS as usize);
@@ -104,8 +92,8 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
             .collect();
         checks.equal(
             format!("{name}, start {START}: COUNTER_OUT in each CLK period of a laser cycle"),
-            numbers(&expected),
-            numbers(&found),
+            in_a_row(&expected),
+            in_a_row(&found),
         );
         if p_counter == PCounter::Gray {
             let bits = found.windows(2).map(|two| (two[0] ^ two[1]).count_ones());
@@ -119,35 +107,21 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     Ok(())
 }
 
-fn drives(netlist: &Netlist, exposure: &Exposure) -> Vec<Drive> {
-    let pin = |name| netlist.net(name).expect("a pin of the testbench");
-    let mut drives: Vec<Drive> = netlist
-        .inputs()
-        .into_iter()
-        .map(|net| Drive::new(Time::ZERO, net, false))
-        .collect();
-    let mut drive = |time, name, value: bool| drives.push(Drive::new(time, pin(name), value));
-    drive(Time::ZERO, "CLK", true);
-    drive(RESET_END, "RESETB", true);
+fn drives(rig: &Rig, exposure: &Exposure) -> Drives {
+    let mut drives = rig.power_up();
+    drives.set(Time::ZERO, rig.net("CLK"), true);
+    drives.set(RESET_END, rig.net("RESETB"), true);
     let load = ORIGIN - Time::from_ns(15);
-    drive(load, "MEMORY_LOAD", true);
-    drive(load + Time::from_ns(2), "MEMORY_LOAD", false);
-    drive(ORIGIN, "ENABLE", true);
+    drives.pulse(rig.net("MEMORY_LOAD"), load, load + Time::from_ns(2));
+    drives.set(ORIGIN, rig.net("ENABLE"), true);
     for cycle in 0..i64::from(CYCLES) {
-        drive(ORIGIN + exposure.stop(cycle), "STOP", true);
-        drive(ORIGIN + exposure.stop_fall(cycle), "STOP", false);
+        let [rise, fall] = [exposure.stop(cycle), exposure.stop_fall(cycle)];
+        drives.pulse(rig.net("STOP"), ORIGIN + rise, ORIGIN + fall);
     }
-    let init = netlist.signal("COUNTER_INIT");
-    let init = init
-        .expect("a bus of the testbench")
-        .into_iter()
-        .enumerate();
-    drives.extend(init.map(|(bit, net)| {
-        let value = START >> bit & 1 == 1;
-        Drive::new(load - Time::from_ns(2), net, value)
-    }));
+    let init = rig.bus("COUNTER_INIT");
+    drives.number(load - Time::from_ns(2), &init, START.into());
     let half_periods = 2 * i64::from(STOP_PERIODS * CYCLES);
-    drives.extend(clock(pin("CLK"), exposure.clock, ORIGIN, -12, half_periods));
+    drives.clock(rig.net("CLK"), exposure.clock, ORIGIN, (-12, half_periods));
     drives
 }
 
@@ -175,10 +149,5 @@ fn view(netlist: &Netlist, end: Time) -> Layout {
         let name = format!("P-counter {}", p_counter.name());
         groups.push(SignalGroup::new(name, shown.chain(own)));
     }
-    Layout {
-        groups,
-        zoom: (ORIGIN - Time::from_ns(10), end),
-        marker: Some(ORIGIN),
-        marks: Vec::new(),
-    }
+    Layout::new(groups, (ORIGIN - Time::from_ns(10), end), ORIGIN)
 }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::netlist::{Corner, Library, Mismatch, Module, Netlist, Timing, varied};
+use crate::netlist::{Corner, Mismatch, Module, varied};
+use crate::testbenches::rig::Rig;
 use crate::units::Time;
 
 /// Codes of each converter, those at the ends among them.
@@ -17,11 +18,10 @@ pub(super) const SIGMA: f64 = 0.2;
 pub(super) const CLEARED: Time = Time::from_ns(2);
 pub(super) const BEGIN: Time = Time::from_ns(4);
 
-/// The netlist of a converter, and its delays with a mismatch of `sigma`.
-pub(super) fn build(module: &Arc<Module>, sigma: f64, seed: u64) -> (Netlist, Timing) {
-    let netlist = Netlist::elaborate(module);
-    let nominal = Timing::nominal(&netlist, &Library::generic_40nm(), Corner::Typ);
+/// A converter whose delays have a mismatch of `sigma`.
+pub(super) fn build(module: &Arc<Module>, sigma: f64, seed: u64) -> Rig {
+    let Rig { netlist, timing } = Rig::new(module, Corner::Typ);
     let mismatch = Mismatch { sigma, seed };
-    let timing = varied(&netlist, &nominal, 1.0, Some(mismatch));
-    (netlist, timing)
+    let timing = varied(&netlist, &timing, 1.0, Some(mismatch));
+    Rig { netlist, timing }
 }

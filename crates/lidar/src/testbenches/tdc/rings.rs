@@ -15,9 +15,10 @@ use super::converter::{BEGIN, BITS, SIGMA, STAGES, build};
 use crate::chip::tdc::coupling::RingRow;
 use crate::chip::tdc::ring_oscillator;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Recorder, Stimulus};
+use crate::kernel::Recorder;
 use crate::netlist::ModuleBuilder;
 use crate::report::{Axis, Chart, Checks};
+use crate::testbenches::rig::finished;
 use crate::units::Time;
 
 /// Rings in a row.
@@ -36,29 +37,14 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let pins: Vec<_> = pins.iter().map(|(name, net)| (*name, &net[..])).collect();
     let ring = ring_oscillator::circuit(STAGES, BITS);
     (0..RINGS).for_each(|pixel| m.instance(&format!("pixel_{pixel}"), &ring, &pins));
-    let (netlist, timing) = build(
-        &m.finish().expect("the testbench's circuit is whole"),
-        SIGMA,
-        2,
-    );
+    let rig = build(&finished(m), SIGMA, 2);
     let nets: Vec<_> = (0..RINGS)
-        .map(|pixel| {
-            netlist
-                .signal(&format!("pixel_{pixel}.RING"))
-                .expect("it was built above")[0]
-        })
+        .map(|pixel| rig.bus(&format!("pixel_{pixel}.RING"))[0])
         .collect();
-    let mut drives: Vec<Drive> = netlist
-        .inputs()
-        .into_iter()
-        .map(|net| Drive::new(Time::ZERO, net, false))
-        .collect();
-    let start = netlist.net("START").expect("it is an input");
-    drives.push(Drive::new(BEGIN, start, true));
+    let mut drives = rig.power_up();
+    drives.set(BEGIN, rig.net("START"), true);
     let mut recorder = Recorder::new(nets.iter().copied());
-    Kernel::new(&netlist, &timing)
-        .run(&mut Stimulus::sorted(drives), SHOWN, &mut recorder)
-        .expect("no loop of cells without delay");
+    rig.run(drives, SHOWN, &mut recorder);
 
     let mut free_hz = Vec::new();
     let mut wrong = 0;
@@ -67,8 +53,8 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         // The first fall is from rest.
         let periods: Vec<Time> = falls.windows(2).map(|ends| ends[1] - ends[0]).collect();
         let model = ring_oscillator::RingOscillatorModel::from_netlist(
-            &netlist,
-            &timing,
+            &rig.netlist,
+            &rig.timing,
             &format!("pixel_{pixel}"),
         );
         wrong += periods

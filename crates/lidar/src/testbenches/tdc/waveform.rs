@@ -8,9 +8,9 @@ use super::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, build};
 use crate::chip::tdc::{clock_counter, delay_line, ring_oscillator};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, Stimulus};
 use crate::netlist::ModuleBuilder;
 use crate::report::Checks;
+use crate::testbenches::rig::{self, finished};
 use crate::units::{Frequency, Time};
 use crate::waves::{Entry, Layout, Mark, SignalGroup};
 
@@ -37,56 +37,37 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     m.instance("clock_counter", &clock_counter::circuit(BITS), &with_clk);
     m.instance("ring", &ring_oscillator::circuit(STAGES, BITS), &pins);
     m.instance("line", &delay_line::circuit(CODES), &pins);
-    let (netlist, timing) = build(
-        &m.finish().expect("the testbench's circuit is whole"),
-        SIGMA,
-        1,
-    );
+    let rig = build(&finished(m), SIGMA, 1);
 
-    let mut drives: Vec<Drive> = netlist
-        .inputs()
-        .into_iter()
-        .map(|net| Drive::new(Time::ZERO, net, false))
-        .collect();
+    let mut drives = rig.power_up();
     for (slot, &interval) in (0..).zip(&intervals) {
         let at = SLOT * slot;
         let fall = at + SLOT - Time::from_ns(5);
-        let pulses = [
-            (clear, at + Time::from_fs(1), at + CLEARED),
-            (start, at + BEGIN, fall),
-            (stop, at + BEGIN + interval, fall + Time::from_ns(2)),
-        ];
-        for (name, (_, up, down)) in ["TDC_RESET", "START", "STOP"].into_iter().zip(pulses) {
-            let net = netlist.net(name).expect("it is an input");
-            drives.extend([Drive::new(up, net, true), Drive::new(down, net, false)]);
-        }
+        drives.pulse(rig.net("TDC_RESET"), at + Time::from_fs(1), at + CLEARED);
+        drives.pulse(rig.net("START"), at + BEGIN, fall);
+        let stop = at + BEGIN + interval;
+        drives.pulse(rig.net("STOP"), stop, fall + Time::from_ns(2));
     }
     let end = SLOT * intervals.len() as i64;
-    let clk = netlist.net("CLK").expect("it is an input");
     let edges = (1..)
         .map(|k| (clock.half_periods(k), k % 2 == 0))
         .take_while(|edge| edge.0 < end);
-    drives.extend(edges.map(|(time, level)| Drive::new(time, clk, level)));
-    let codes = ["ring.CODE", "line.SEEN"];
-    let nets = codes.map(|path| netlist.signal(path).expect("it was built above"));
+    edges.for_each(|(time, level)| drives.set(time, rig.net("CLK"), level));
+    let nets = ["ring.CODE", "line.SEEN"].map(|path| rig.bus(path));
     let models = [
-        ring_oscillator::RingOscillatorModel::from_netlist(&netlist, &timing, "ring")
+        ring_oscillator::RingOscillatorModel::from_netlist(&rig.netlist, &rig.timing, "ring")
             .steps(1 << BITS),
-        delay_line::model(&netlist, &timing, "line"),
+        delay_line::model(&rig.netlist, &rig.timing, "line"),
     ];
-    let mut kernel = Kernel::new(&netlist, &timing);
-    let mut stimulus = Stimulus::sorted(drives);
+    let (mut kernel, mut stimulus) = (rig.kernel(), drives.sorted());
     let mut found = Vec::new();
-    write_waves(waves, &netlist, &view(), |waves| {
+    write_waves(waves, &rig.netlist, &view(), |waves| {
         for slot in 1..=intervals.len() as i64 {
-            kernel
-                .run(&mut stimulus, SLOT * slot - Time::from_ns(6), waves)
-                .expect("no loop of cells without delay");
+            let read = SLOT * slot - Time::from_ns(6);
+            rig::run(&mut kernel, &mut stimulus, read, waves);
             found.push(nets.each_ref().map(|nets| kernel.number(nets)));
         }
-        kernel
-            .run(&mut stimulus, end, waves)
-            .expect("no loop of cells without delay");
+        rig::run(&mut kernel, &mut stimulus, end, waves);
         end
     })?;
     for (&interval, found) in intervals.iter().zip(found) {
