@@ -55,6 +55,7 @@ mod standard_cells_serve_other_tools;
 mod static_timing_bounds_the_kernel;
 mod tdcs_agree_with_their_models;
 mod testbenches_pass;
+mod the_correlation_block_agrees_with_its_model;
 mod the_sensor_keeps_its_timing_checks;
 mod timing_verdicts_agree_with_gates;
 mod traces_are_deterministic;
