@@ -23,17 +23,18 @@
 //! Paths and constants are found with zero delay and three values, where X stands for any value; loads and rounds are simulated,
 //! 64 codes at a time, with the library's delays, because pulses that a netlist makes for itself need delays.
 
+mod load;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use self::load::Load;
 use crate::chip::config::AfterBorrow;
-use crate::chip::p_counter::count_down::{CountDownSetup, SHORTEST_PAUSE};
-use crate::chip::timing::silicon::Silicon;
+use crate::chip::p_counter::count_down::CountDownSetup;
 use crate::chip::{Probe, Probes};
-use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
+use crate::kernel::LANES;
 use crate::logic::Logic;
-use crate::netlist::{CellId, CellKind, Corner, FlatCell, MAX_INPUTS, Module, NetId, Netlist};
-use crate::units::Time;
+use crate::netlist::{CellId, CellKind, FlatCell, MAX_INPUTS, Module, NetId, Netlist};
 
 /// Pins of a flip-flop.
 const D: usize = 0;
@@ -436,117 +437,4 @@ fn passes(cell: &FlatCell, pin: usize, values: &[Value]) -> bool {
     possible
         .iter()
         .any(|&(word, output)| output_of(word ^ flipped).is_some_and(|&(_, other)| other != output))
-}
-
-/// Up to 64 codes, loaded into a counter whose flip-flops were unknown.
-struct Load<'c> {
-    counter: &'c Counter<'c>,
-    codes: &'c [u16],
-    kernel: LaneKernel,
-    now: Time,
-}
-
-impl<'c> Load<'c> {
-    /// `moves`: COUNTER_INIT changes while MEMORY_LOAD is high.
-    fn new(counter: &'c Counter<'c>, codes: &'c [u16], moves: bool) -> Self {
-        let netlist = counter.netlist;
-        let timing = Silicon::nominal(Corner::Typ).timing(netlist);
-        let mut load = Load {
-            counter,
-            codes,
-            kernel: LaneKernel::new(netlist, &timing),
-            now: Time::ZERO,
-        };
-        let low: Vec<_> = netlist.inputs().iter().map(|&net| (net, 0)).collect();
-        load.drive(&low);
-        load.set(Probe::CounterReset, true);
-        let bits = (0..).zip(counter.init()).map(|(bit, &net)| {
-            let lanes = (0..).zip(codes);
-            let word = lanes.fold(0, |word, (lane, code)| {
-                word | u64::from(code >> bit & 1) << lane
-            });
-            (net, word)
-        });
-        let bits: Vec<(NetId, u64)> = bits.collect();
-        load.drive(&bits);
-        load.set(Probe::MemoryLoad, true);
-        if moves {
-            let moved: Vec<_> = bits.iter().map(|&(net, word)| (net, !word)).collect();
-            load.drive(&moved);
-        }
-        load.set(Probe::MemoryLoad, false);
-        load
-    }
-
-    fn drive(&mut self, drives: &[(NetId, u64)]) {
-        let time = self.now;
-        let drives = drives.iter().map(|&(net, word)| LaneDrive {
-            time,
-            net,
-            mask: u64::MAX,
-            values: Lanes::from_bits(word),
-        });
-        self.now += SHORTEST_PAUSE;
-        self.kernel
-            .run(&mut drives.peekable(), self.now, &mut ())
-            .expect("no loop of cells without delay");
-    }
-
-    fn set(&mut self, pin: Probe, value: bool) {
-        let net = self.counter.probes.net(pin);
-        self.drive(&[(net, if value { u64::MAX } else { 0 })]);
-    }
-
-    fn used(&self) -> u64 {
-        u64::MAX >> (LANES - self.codes.len())
-    }
-
-    /// Lanes in which a flip-flop holds a 1.
-    fn ones(&self, cell: usize) -> u64 {
-        let [q, qn] = self.counter.netlist.cells()[cell].outputs;
-        self.used()
-            & match (q, qn) {
-                (Some(q), _) => self.kernel.value(q).one,
-                (None, Some(qn)) => self.kernel.value(qn).zero,
-                (None, None) => 0,
-            }
-    }
-
-    /// Lanes in which nobody knows what a flip-flop holds.
-    fn unknown(&self, cell: usize) -> u64 {
-        let net = self.counter.netlist.cells()[cell].output_nets().next();
-        let known = net.map(|net| self.kernel.value(net));
-        self.used() & !known.map_or(u64::MAX, |known| known.one | known.zero)
-    }
-
-    /// A flip-flop that is not the same when LOCAL_STOP rises for the second time as when it rose first.
-    fn changed_by_a_round(mut self, counting: &[usize], expected: CountDownSetup) -> Option<usize> {
-        self.set(Probe::CounterReset, false);
-        let local_stop = self.counter.local_stop();
-        let bits = self.counter.init().len();
-        let mut first = vec![0; counting.len()];
-        let (mut risen, mut done) = (0, 0);
-        let mut high = self.kernel.value(local_stop).one;
-        // As many edges as the law is measured with.
-        for _ in 0..(expected.step_periods as u32) << (bits + 2) {
-            if done == self.used() {
-                break;
-            }
-            self.set(Probe::CounterClk, true);
-            let level = self.kernel.value(local_stop).one;
-            let rose = level & !high & self.used();
-            high = level;
-            for (&cell, first) in counting.iter().zip(&mut first) {
-                let ones = self.ones(cell);
-                if (ones ^ *first) & rose & risen & !done != 0 {
-                    return Some(cell);
-                }
-                *first |= ones & rose & !risen;
-            }
-            done |= rose & risen;
-            risen |= rose;
-            self.set(Probe::CounterClk, false);
-        }
-        None
-    }
 }
