@@ -102,17 +102,20 @@ pub(super) fn calibrated() -> &'static BinProfile {
     &measured().calibrated
 }
 
-/// The calibration of four rows whose elements are all alike.
-pub(super) fn calibrated_alike() -> BinProfile {
-    let alike: Sensor = SensorConfig {
-        delay_sigma: 0.0,
-        ..(*sensor()).clone()
-    }
-    .into();
-    let calibrated = calibrate(&alike, STOP_PERIODS, &Sweep::default(), || ());
-    calibrated
-        .expect("the window engine follows delay lines")
-        .profile
+/// The calibration of four rows whose elements are all alike, made once.
+pub(super) fn calibrated_alike() -> &'static BinProfile {
+    static ALIKE: OnceLock<BinProfile> = OnceLock::new();
+    ALIKE.get_or_init(|| {
+        let alike: Sensor = SensorConfig {
+            delay_sigma: 0.0,
+            ..(*sensor()).clone()
+        }
+        .into();
+        let calibrated = calibrate(&alike, STOP_PERIODS, &Sweep::default(), || ());
+        calibrated
+            .expect("the window engine follows delay lines")
+            .profile
+    })
 }
 
 /// Lengths of all bins that the sweep found, ns.

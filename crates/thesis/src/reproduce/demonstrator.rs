@@ -106,7 +106,7 @@ const SWEEPS: u64 = 4;
 /// σ of the sweep's last point, m.
 fn sigma_m(otherwise: DemonstratorVariant) -> f64 {
     let demonstrator = if otherwise.alike {
-        Demonstrator::new(delay_line::calibrated_alike())
+        Demonstrator::new(delay_line::calibrated_alike().clone())
     } else {
         chain()
     };

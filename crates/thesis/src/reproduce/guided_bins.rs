@@ -84,6 +84,8 @@ fn least_bin_of_sensor_m(depth_m: f64, sensor: &SensorConfig, from_m: f64) -> f6
     let farthest_m = estimates
         .iter()
         .fold(0.0f64, |far, e| far.max(e.0).max(e.1));
+    let least_inside = (WITHIN * estimates.len() as f64).ceil() as usize;
+    let most_outside = estimates.len() - least_inside;
     let mut bin_m = from_m;
     loop {
         let config = SensorConfig {
@@ -97,8 +99,9 @@ fn least_bin_of_sensor_m(depth_m: f64, sensor: &SensorConfig, from_m: f64) -> f6
             let window = start.and_then(|start| law.window(start).open());
             window.is_some_and(|window| law.interval(&window).contains(&Time::of_flight(true_m)))
         };
-        let inside = estimates.iter().filter(|e| is_inside(e)).count();
-        if inside as f64 >= WITHIN * estimates.len() as f64 {
+        // One more than may be outside tells of the bin: most bins are much too small.
+        let outside = estimates.iter().filter(|e| !is_inside(e));
+        if outside.take(most_outside + 1).count() <= most_outside {
             return bin_m;
         }
         bin_m *= FINER;
