@@ -23,7 +23,7 @@ fn the_corner_at_which_384_mhz_fails_is_that_of_the_gates() {
         let range = factor_range(&config, &TYPICAL, kept).unwrap();
         assert_eq!((range.fastest, range.moved), (None, 0));
         let at = (config.clock().period(), Time::ZERO);
-        let works = |factor| gate_works(&config, &TYPICAL.with_factor(factor), kept, at, 0);
+        let works = |factor| gate_works(&config, &TYPICAL.with_factor(factor), kept, 0)(at);
         let slowest = range.slowest;
         assert!(works(slowest - 1e-5) && !works(slowest + 3e-5), "{slowest}");
     }
@@ -39,7 +39,7 @@ fn a_clock_above_the_forbidden_band_fails_with_faster_silicon_as_the_gates_do() 
     let range = factor_range(&config, &TYPICAL, Limits::Kept).unwrap();
     assert_eq!(range.moved, 1);
     let at = (config.clock().period(), Time::ZERO);
-    let works = |factor| gate_works(&config, &TYPICAL.with_factor(factor), Limits::Kept, at, 1);
+    let works = |factor| gate_works(&config, &TYPICAL.with_factor(factor), Limits::Kept, 1)(at);
     let fastest = range.fastest.unwrap();
     assert!(works(fastest + 1e-5) && !works(fastest - 3e-5), "{fastest}");
     // The correlation path limits the other end: the gates have its false edges to spare.

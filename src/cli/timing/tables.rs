@@ -136,16 +136,16 @@ pub(super) fn periods(subject: &Subject<'_>) -> Section {
         (Limits::Kept, "setup, hold, widths"),
     ] {
         let pixel = subject.timing(limits);
-        let gates = |period, phase| gate_works(config, silicon, limits, (period, phase), 0);
+        let gates = gate_works(config, silicon, limits, 0);
         let correlation = CorrelationTiming::simulate(config, silicon, limits);
         push(
             &format!("STOP on CLK's fall: {suffix}"),
             shortest_period(SLOW, |p| pixel.works(p, Time::ZERO)),
-            shortest_period(SLOW, |p| gates(p, Time::ZERO)),
+            shortest_period(SLOW, |p| gates((p, Time::ZERO))),
         );
         // Below the band in which the strobe meets the shift register a STOP phase helps again.
         let below = pixel.forbidden(0).0 - Time::from_ps(2);
-        let simulated = shortest_period(below, |p| phases(p).any(|phase| gates(p, phase)));
+        let simulated = shortest_period(below, |p| phases(p).any(|phase| gates((p, phase))));
         push(
             &format!("best STOP phase: {suffix}"),
             shortest_period(below, |p| phases(p).any(|phase| pixel.works(p, phase))),
@@ -409,7 +409,7 @@ pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
             let at = (config.clock().period(), config.stop_phase());
             let works = |factor: f64| {
                 let silicon = silicon.with_factor(factor);
-                gate_works(config, &silicon, Limits::Kept, at, range.moved)
+                gate_works(config, &silicon, Limits::Kept, range.moved)(at)
             };
             let gates = |works_at: f64, fails_at: f64| match (works(works_at), works(fails_at)) {
                 _ if !config.may_have_law() => "not simulated",

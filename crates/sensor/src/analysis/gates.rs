@@ -1,9 +1,12 @@
 //! The event kernel's answers to the questions of static timing.
 
+use std::sync::Arc;
+
 use crate::chip::p_counter::Rises;
-use crate::chip::{Exposure, Limits, Probe, Sensor, SensorConfig, Silicon, WindowLaw};
+use crate::chip::{Exposure, Limits, Probe, Sensor, SensorConfig, Silicon, WindowLaw, array};
 use crate::engine::GateSimulation;
 use crate::kernel::{Policy, Recorder, TimingChecks};
+use crate::netlist::{Netlist, Timing};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
@@ -42,18 +45,36 @@ fn slowest_start(config: &SensorConfig, silicon: &Silicon) -> u16 {
 }
 
 /// Whether a gate-level macropixel counts a pattern of photons into the bins of a slow clock, or as many bins later, and,
-/// if limits are to be kept, breaks none.
+/// if limits are to be kept, breaks none: at a CLK period and a STOP phase.
 pub fn gate_works(
     config: &SensorConfig,
     silicon: &Silicon,
     limits: Limits,
-    (period, phase): (Time, Time),
+    moved: i64,
+) -> impl Fn((Time, Time)) -> bool + use<> {
+    // The netlist and its delays are those of all clocks.
+    let array = array::subarray(config, (0, 0), (1, 1));
+    let netlist = Arc::new(Netlist::elaborate(&array));
+    let timing = silicon.timing(&netlist);
+    let start = slowest_start(config, silicon);
+    let (config, silicon) = (config.clone(), *silicon);
+    move |at| {
+        let built = (netlist.clone(), timing.clone());
+        counts_pattern(built, &config, &silicon, limits, (at, start), moved)
+    }
+}
+
+fn counts_pattern(
+    built: (Arc<Netlist>, Timing),
+    config: &SensorConfig,
+    silicon: &Silicon,
+    limits: Limits,
+    ((period, phase), start): ((Time, Time), u16),
     moved: i64,
 ) -> bool {
     let Ok(clock) = Frequency::from_period(period) else {
         return false;
     };
-    let start = slowest_start(config, silicon);
     let every = Rises::from_start_value(config, start).and_then(|rises| rises.every);
     let exposure = Exposure {
         clock,
@@ -92,7 +113,10 @@ pub fn gate_works(
         }
     }
     pulses.sort_unstable();
-    let mut gate = simulation(&config, silicon, &exposure, start, &pulses);
+    let sensor = Sensor::from(config).made_of(silicon);
+    let place = ((0, 0), (1, 1));
+    let mut gate =
+        GateSimulation::of_netlist(built, sensor, &exposure, place, &[start], &[&pulses]);
     let violated = match limits {
         Limits::Ignored => {
             gate.run(&mut ());

@@ -51,6 +51,25 @@ impl GateSimulation {
         let sensor = sensor.into();
         let netlist = Arc::new(Netlist::elaborate(&array::subarray(&sensor, first, size)));
         let timing = sensor.silicon().timing(&netlist);
+        Self::of_netlist(
+            (netlist, timing),
+            sensor,
+            exposure,
+            (first, size),
+            starts,
+            pulses,
+        )
+    }
+
+    /// The simulation of a netlist that is elaborated already, and its delays: those of [`GateSimulation::new`] do not depend on the clocks.
+    pub(crate) fn of_netlist(
+        (netlist, timing): (Arc<Netlist>, Timing),
+        sensor: Sensor,
+        exposure: &Exposure,
+        (first, size): ((usize, usize), (usize, usize)),
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Self {
         let kernel = Kernel::new(&netlist, &timing);
         let rectangle = (0..size.0).flat_map(|row| (0..size.1).map(move |col| (row, col)));
         let probes = rectangle

@@ -101,9 +101,8 @@ pub(super) fn ripple_rows() -> Vec<ClaimRow> {
         .fold(f64::NEG_INFINITY, f64::max);
     let slow = Time::from_ns(20);
     let ns = |time: Option<Time>| time.map_or(f64::NAN, Time::as_ns);
-    let by_gates = shortest_period(slow, |p| {
-        gate_works(&config, &NOMINAL, Limits::Ignored, (p, Time::ZERO), 0)
-    });
+    let gates = gate_works(&config, &NOMINAL, Limits::Ignored, 0);
+    let by_gates = shortest_period(slow, |p| gates((p, Time::ZERO)));
     let by_paths = shortest_period(slow, |p| timing.works(p, Time::ZERO));
     let below = timing.forbidden(0).0 - Time::from_ps(2);
     let any_phase = shortest_period(below, |p| phases(p).any(|phase| timing.works(p, phase)));

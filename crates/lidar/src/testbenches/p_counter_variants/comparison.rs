@@ -118,6 +118,7 @@ impl Row {
         let activity = Activity::simulate(&config, &rig);
         let by_paths = MacropixelTiming::analyse(&config, &TYPICAL, Limits::Ignored, (0, 0));
         let ripple = ripple(&config, &TYPICAL);
+        let by_gates = gate_works(&config, &TYPICAL, Limits::Ignored, 0);
         Row {
             stage: p_counter.stage_transistors(),
             transistors,
@@ -128,9 +129,7 @@ impl Row {
             activity,
             period: (
                 shortest_period(SLOW, |p| by_paths.works(p, Time::ZERO)),
-                shortest_period(SLOW, |p| {
-                    gate_works(&config, &TYPICAL, Limits::Ignored, (p, Time::ZERO), 0)
-                }),
+                shortest_period(SLOW, |p| by_gates((p, Time::ZERO))),
             ),
         }
     }
