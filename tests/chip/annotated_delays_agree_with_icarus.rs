@@ -2,6 +2,7 @@
 //! times to the femtosecond and the same histograms as our kernel, whether we annotate the file onto our cells or Icarus
 //! onto the standard ones. Skipped, loudly, where Icarus is absent.
 
+use crate::cases::cases;
 use crate::icarus;
 
 use std::collections::HashSet;
@@ -90,7 +91,7 @@ fn a_slow_qn_is_not_a_slow_q() {
             let nominal = stops("memory.memory_0", "QN");
             ["Q", "QN"].map(|output| stops("counter_0", output) != nominal)
         };
-        let seen: HashSet<_> = (0..4).map(moves).collect();
+        let seen: HashSet<_> = (0..2).map(moves).collect();
         assert_eq!(seen, HashSet::from([[true, false], [false, true]]));
     }
 }
@@ -98,7 +99,8 @@ fn a_slow_qn_is_not_a_slow_q() {
 #[test]
 fn macropixels_with_random_delays() {
     if icarus::is_here() {
-        let all: Vec<_> = (0..12).map(|seed| compare(seed, drawn)).collect();
+        let seeds = if cases(1) > 1 { 12 } else { 5 };
+        let all: Vec<_> = (0..seeds).map(|seed| compare(seed, drawn)).collect();
         assert!(all.iter().all(|stops| !stops.is_empty()), "{all:?}");
         let different: HashSet<_> = all.iter().collect();
         assert_eq!(different.len(), all.len(), "the delays must show");

@@ -211,7 +211,7 @@ impl Block {
         assert_eq!(verdict, Verdict::Proven, "{module} {config:?}");
     }
 
-    /// Exchanges cells of `module` for another one, in turn, and wants a difference within `steps` steps: every third cell, or
+    /// Exchanges cells of `module` for another one, in turn, and wants a difference within `steps` steps: every fifth cell, or
     /// every one where `GDTOF_CASES` asks for more than usual.
     fn refute_mutants_of(&self, module: &str, steps: usize) {
         let folder = tempfile::tempdir().unwrap();
@@ -220,7 +220,7 @@ impl Block {
         let design = fs::read_to_string(&file).unwrap();
         let begin = design.find(&format!("\nmodule {module}(")).unwrap();
         let end = begin + design[begin..].find("\nendmodule").unwrap();
-        let apart = if cases::cases(1) > 1 { 1 } else { 3 };
+        let apart = if cases::cases(1) > 1 { 1 } else { 5 };
         let cells = design[begin..end].lines();
         let cells = cells.filter_map(|line| Some((line, mutant(line)?)));
         let mut mutants = 0;
@@ -288,8 +288,13 @@ fn p_counters_of_9_bits_are_proven_for_all_start_values_and_steps() {
     if !yosys_is_here() {
         return;
     }
+    let steps = if cases::cases(1) > 1 {
+        &[1, 2, 4, 8][..]
+    } else {
+        &[1, 8]
+    };
     for sensor in p_counters() {
-        for step_periods in [1, 2, 4, 8] {
+        for &step_periods in steps {
             let config = SensorConfig {
                 step_periods,
                 ..sensor.clone()

@@ -13,6 +13,7 @@
 //! Chips: the QuantIC4x4 with every P-counter whose reset pulse is not more than 50 ps too short in the library (`gdtof timing` says by how much; removal times, which neither
 //! simulator knows, are in it). HSLIDAR's reset, which loads the counter, is too short in them.
 
+use crate::cases::cases;
 use crate::every_edge::waves::Waves;
 use crate::icarus;
 use crate::library_chips::{self, MappedChip};
@@ -178,12 +179,17 @@ fn edge_by_edge() {
     if !icarus::is_here() {
         return;
     }
+    // Half of the chips in each library, each chip in some.
+    let takes_all = cases(1) > 1;
     let mut compared = 0;
-    for (library, text) in library_chips::libraries() {
+    for (place, (library, text)) in library_chips::libraries().into_iter().enumerate() {
         let chips = library_chips::chips()
             .into_iter()
             .filter(|chip| !chip.reset_to_load);
         for (seed, chip) in (0..).zip(chips) {
+            if !takes_all && !(place + seed as usize).is_multiple_of(2) {
+                continue;
+            }
             let p_counter = chip.p_counter;
             let mapped = MappedChip::new(&text, chip);
             let verdict =
@@ -204,5 +210,5 @@ fn edge_by_edge() {
             assert!(edges > 1000 && off <= most, "{found}");
         }
     }
-    assert!(compared >= 6, "{compared}");
+    assert!(compared >= if takes_all { 6 } else { 3 }, "{compared}");
 }

@@ -93,7 +93,9 @@ fn delay_lines_pass_pulses_shorter_than_their_elements() {
         return;
     }
     let mut photons = 0;
-    for (seed, corner) in (0..3).zip(Corner::ALL) {
+    // One corner, or all where `GDTOF_CASES` asks for more than usual.
+    let corners = if cases::cases(1) > 1 { 3 } else { 1 };
+    for (seed, corner) in (0..).zip(Corner::ALL).take(corners) {
         let config = SensorConfig {
             rows: 1,
             cols: 1,

@@ -1,4 +1,6 @@
 //! Every command of the book, `docs/`, in the order in which it stands in its chapter.
+//!
+//! What takes seconds is shortened, most of it to a smaller array. With `GDTOF_CASES=1` nothing is.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,6 +8,85 @@ use std::process::Command;
 use rayon::prelude::*;
 
 use super::the_readme_runs::blocks;
+use super::tools::takes_all;
+
+/// What the commands have that need not take the whole array, because no later command reads a macropixel of theirs.
+const ON_A_SMALL_ARRAY: [&str; 32] = [
+    // first-hour
+    "vcsel_flash --out hall",
+    "--out worker",
+    "--out weak",
+    "illuminance_klux=50 --out sun",
+    "max_disparity_px=31 --out near",
+    "--out smoke",
+    "--out short",
+    "--out long",
+    "my_chip.toml --out mine",
+    // concepts, guides
+    "--probe none --out conventional",
+    "third_camera_baseline_m=0.2 --out near",
+    // frame, drive, page, stereo
+    "--out glass",
+    "--out slower",
+    "--out truth",
+    "--out fused",
+    "--out neighbour",
+    "--out cohort",
+    "--out cheapest",
+    "--laser-cycles 200 --out drive",
+    "--out tracked",
+    "--out recorded",
+    "--out still",
+    "--out matched",
+    "--probe none --page",
+    // settings, recipes, physics
+    "--out warehouse",
+    "--out shift_register",
+    "--out more_bins",
+    "--out fewer_spads",
+    "--out guide_$sigma",
+    "--out sun_$klux",
+    "--out hot",
+    "--out two_lidars",
+];
+
+/// Fewer macropixels, each with about the light of one of the whole array.
+const SMALL_ARRAY: &str = "--rows 16 --cols 16 --set scene.lidar.fov_deg=2";
+
+/// What is short for what else takes long: fewer macropixels of which times are told, fewer points and frames, another demo and
+/// another figure.
+const SHORTENED: [(&str, &str); 12] = [
+    (
+        "demo fog --laser-cycles 500",
+        "demo glass --calibration-step-ps 200 --laser-cycles 100",
+    ),
+    ("timing --block", "timing --rows 4 --cols 4 --block"),
+    ("timing --process", "timing --rows 4 --cols 4 --process"),
+    (
+        "timing --rows 16 --cols 16 --mismatch",
+        "timing --rows 4 --cols 4 --mismatch",
+    ),
+    ("timing --set", "timing --rows 4 --cols 4 --set"),
+    (
+        "gdtof timing --liberty",
+        "gdtof timing --rows 4 --cols 4 --liberty",
+    ),
+    ("timing --explain", "timing --rows 4 --cols 4 --explain"),
+    (
+        "--mapped --out mapped",
+        "--mapped --rows 2 --cols 2 --out mapped",
+    ),
+    ("--figure 45 ", "--figure 32 "),
+    (
+        "--frames 4 --laser-cycles 400",
+        "--frames 2 --laser-cycles 400",
+    ),
+    ("steps = 3, scale", "steps = 2, scale"),
+    (
+        "--bins 8,16 --clk 200,384 --thresholds 0 --guide-sigma 0.3,1",
+        "--bins 16 --clk 384 --thresholds 0 --guide-sigma 0.3",
+    ),
+];
 
 fn book() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src")
@@ -18,6 +99,21 @@ fn chapters() -> Vec<String> {
     links
         .map(|link| link.trim_end_matches(')').to_owned())
         .collect()
+}
+
+/// The commands of a chapter, which take little time unless all is asked for.
+fn commands(text: &str) -> String {
+    let mut commands = blocks(text, "sh").concat().join("\n");
+    if takes_all() {
+        return commands;
+    }
+    for words in ON_A_SMALL_ARRAY {
+        commands = commands.replace(words, &format!("{words} {SMALL_ARRAY}"));
+    }
+    for (long, short) in SHORTENED {
+        commands = commands.replace(long, short);
+    }
+    commands
 }
 
 /// Counts of `replay` and laser cycles of `wave` below a folder in which nothing is counted: they show a reader nothing.
@@ -85,12 +181,7 @@ fn every_command_runs() {
                 }
             }
             let output = Command::new("bash")
-                .args([
-                    "-euo",
-                    "pipefail",
-                    "-c",
-                    &blocks(&text, "sh").concat().join("\n"),
-                ])
+                .args(["-euo", "pipefail", "-c", &commands(&text)])
                 .env("PATH", &path)
                 .current_dir(empty.path())
                 .output()
@@ -104,6 +195,21 @@ fn every_command_runs() {
         })
         .collect();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+#[test]
+fn what_is_shortened_stands_in_the_book() {
+    let texts = chapters()
+        .into_iter()
+        .map(|chapter| std::fs::read_to_string(book().join(chapter)).unwrap());
+    let all: Vec<String> = texts
+        .flat_map(|text| blocks(&text, "sh").concat())
+        .collect();
+    let long = SHORTENED.iter().map(|(long, _)| *long);
+    for words in ON_A_SMALL_ARRAY.into_iter().chain(long) {
+        let stands = all.iter().any(|line| line.contains(words));
+        assert!(stands, "{words} is in no command of the book");
+    }
 }
 
 #[test]

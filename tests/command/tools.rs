@@ -11,6 +11,11 @@ pub fn gdtof_words(folder: &Path, arguments: &str) -> Output {
     gdtof(folder, &arguments)
 }
 
+/// Whether all cases are asked for, as each night, and not only those of each change.
+pub fn takes_all() -> bool {
+    std::env::var_os("GDTOF_CASES").is_some()
+}
+
 /// Runs a script that needs no package and must succeed. Skipped, loudly, where there is no Python.
 pub fn python(folder: &Path, script: &str) {
     let read = Command::new("python3")

@@ -55,7 +55,7 @@ impl Tally {
 fn as_the_gates_count() {
     let mut tally = Tally::default();
     let folder = tempfile::tempdir().unwrap();
-    for seed in (0..cases(100)).chain(FOUND) {
+    for seed in (0..cases(30)).chain(FOUND) {
         let library = seed / CHIPS_OF_A_LIBRARY;
         let file = folder.path().join(format!("{library}.lib"));
         if !file.exists() {

@@ -252,7 +252,7 @@ mod tests {
         waiting.lidar.dither_ns = DITHER_NS;
         let disturbance = Disturbance {
             cases: vec![("still".into(), one), ("we wait".into(), waiting)],
-            draws: 2,
+            draws: 1,
             ..Disturbance::interference()
         };
         let outcomes = disturbance.outcomes(&demonstrator, 1, || ()).unwrap();

@@ -28,6 +28,7 @@ fn all(source: &LightSource, most_bytes: f64) -> (Vec<(u32, SpadEvent)>, PulseTo
 #[test]
 fn chunks_and_threads_change_nothing() {
     let source = street(|lit| LitExposure {
+        laser_cycles: 40,
         spads: SpadModel {
             afterpulse_probability: 0.02,
             afterpulse_time: Time::from_ns(20),

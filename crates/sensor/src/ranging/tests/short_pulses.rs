@@ -40,9 +40,15 @@ fn ranged(fwhm_ns: f64, photons: f64, background_hz: f64, half_depth: f64) -> Ve
 #[test]
 fn bounds_hold_for_pulses_of_any_length_and_light() {
     let (mut all, mut beyond) = (0, 0);
-    for fwhm_ns in [0.0, 0.2, 0.5, 1.0, 2.0, 4.5] {
-        for background_hz in [0.0, 8e6, 50e6] {
-            for (photons, half_depth) in [
+    // Every third light, or all where `GDTOF_CASES` asks for them.
+    let apart = if std::env::var_os("GDTOF_CASES").is_some() {
+        1
+    } else {
+        3
+    };
+    for (pulse, fwhm_ns) in [0.0, 0.2, 0.5, 1.0, 2.0, 4.5].into_iter().enumerate() {
+        for (sun, background_hz) in [0.0, 8e6, 50e6].into_iter().enumerate() {
+            for (echo, (photons, half_depth)) in [
                 (0.3, 0.0),
                 (1.0, 0.0),
                 (1.0, 0.15),
@@ -51,7 +57,13 @@ fn bounds_hold_for_pulses_of_any_length_and_light() {
                 (20.0, 0.0),
                 (50.0, 0.0),
                 (300.0, 0.0),
-            ] {
+            ]
+            .into_iter()
+            .enumerate()
+            {
+                if !(pulse + sun + echo).is_multiple_of(apart) {
+                    continue;
+                }
                 let light =
                     format!("{fwhm_ns} ns, {photons} photons +- {half_depth}, {background_hz} Hz");
                 let ranged = ranged(fwhm_ns, photons, background_hz, half_depth);
