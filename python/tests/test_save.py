@@ -66,7 +66,7 @@ def test_hints_are_data(command: Command, tmp_path: Path) -> None:
     """Cars nearer than the camera pair begins have no guide."""
     scene = gdtof.Scene("street", {"stereo.max_disparity_px": 180})
     frame = gdtof.frame(gdtof.Sensor(rows=32, cols=32), scene, laser_cycles=200)
-    [hint] = frame.hints
+    hint, *others = frame.hints
     without = (frame.reason == gdtof.Reason.NO_GUIDE) & np.isfinite(frame.truth)
     assert hint.reason is gdtof.Reason.NO_GUIDE and hint.surfaces == np.count_nonzero(without) > 0
     assert html.escape(hint.sentence) in frame._repr_html_() and frame.to_xarray().attrs["hints"] == hint.sentence
@@ -75,7 +75,7 @@ def test_hints_are_data(command: Command, tmp_path: Path) -> None:
     assert hint.sentence in command(*words, tmp_path / "theirs")
     hints = told(tmp_path / "ours")["hints"]
     assert hints == told(tmp_path / "theirs")["hints"]
-    assert hints == [{"reason": "no_guide", "surfaces": hint.surfaces, "sentence": hint.sentence}]
+    assert hints[0] == {"reason": "no_guide", "surfaces": hint.surfaces, "sentence": hint.sentence} and len(hints) == 1 + len(others)
     assert pickle.loads(pickle.dumps(frame)).hints == frame.hints
 
 

@@ -63,6 +63,10 @@ pub(super) struct FrameArgs {
     /// Do not correct depths for the range walk of strong echoes.
     #[arg(long)]
     no_walk_correction: bool,
+    /// Ends of the colours of depth.png, m, as in 0-50, so that pictures of several frames compare [default: the frame's shortest and longest
+    /// depth].
+    #[arg(long, value_name = "NEAR-FAR", value_parser = depth_scale)]
+    depth_scale_m: Option<(f32, f32)>,
     /// Also write page.html, to look at the frame in a browser (gdtof page makes one later).
     #[arg(long)]
     page: bool,
@@ -124,7 +128,7 @@ pub(super) fn run(mut args: FrameArgs) -> anyhow::Result<()> {
     let pair_report = pair.as_ref().map(|pair| &pair.report);
     let name = scene_name(args);
     let report = FrameReport::new(name, &request, &settings, &timing, &frame, pair_report);
-    report.write(results.staging(), &frame.histograms)?;
+    report.write(results.staging(), &frame.histograms, args.depth_scale_m)?;
     if args.page {
         let page = Page::read(results.staging(), &args.out, 1)?;
         page.write(&results.staging().join("page.html"))?;
@@ -171,6 +175,14 @@ impl FrameArgs {
         request.correct_walk = !self.no_walk_correction;
         request
     }
+}
+
+fn depth_scale(text: &str) -> Result<(f32, f32), String> {
+    let ends = text.split_once('-');
+    let ends = ends.and_then(|(near, far)| Some((near.parse().ok()?, far.parse().ok()?)));
+    let is_scale = |ends: &(f32, f32)| ends.0 >= 0.0 && ends.0 < ends.1 && ends.1 <= 1e5;
+    ends.filter(is_scale)
+        .ok_or_else(|| "are no two rising distances; give them in metres, as in 0-50".to_owned())
 }
 
 fn wave_cycles(text: &str) -> Result<WaveCycles, String> {

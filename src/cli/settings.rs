@@ -1,5 +1,6 @@
 //! `--sensor`, `--scene` and `--set`, and the commands that print what they make: `gdtof sensor` and `gdtof scene`.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -14,7 +15,7 @@ use crate::files::InputError;
 use crate::netlist::{Conditions, Corner, Mismatch};
 use crate::request::{Sources, Spelling};
 use crate::scene::Scene;
-use crate::settings::Notes;
+use crate::settings::{Notes, said_remarks};
 
 /// Which sensor.
 #[derive(Args)]
@@ -62,6 +63,9 @@ pub(super) struct PrintSensorArgs {
     /// Sensor: a name or a file, as for --sensor.
     #[arg(value_name = "SENSOR", conflicts_with = "sensor")]
     chip: Option<PathBuf>,
+    /// Print the names of the built-in sensors instead, and what they are.
+    #[arg(long)]
+    list: bool,
     #[command(flatten)]
     sensor: SensorArgs,
 }
@@ -72,6 +76,9 @@ pub(super) struct PrintSceneArgs {
     /// Scene: a name or a file, as for --scene.
     #[arg(value_name = "SCENE", conflicts_with = "scene")]
     world: Option<PathBuf>,
+    /// Print the names of the built-in scenes instead, and what they show.
+    #[arg(long)]
+    list: bool,
     #[command(flatten)]
     scene: SceneArgs,
 }
@@ -119,6 +126,7 @@ impl SensorArgs {
         if let Some(library) = library.and_then(CellLibrary::from_file) {
             library.remarks.iter().for_each(note);
         }
+        note_unusual(self.source_name(), &sensor.remarks());
         if self.chip() == "hslidar" && sensor.clk_hz > HSLIDAR_MOST_HZ {
             note(format_args!(
                 "CLK of {} MHz: the thesis's HSLIDAR takes {} MHz at most (6.3.1), and what is modelled here is its logic in a faster library",
@@ -126,6 +134,12 @@ impl SensorArgs {
                 HSLIDAR_MOST_HZ / 1e6
             ));
         }
+    }
+
+    /// What notes call the sensor.
+    fn source_name(&self) -> String {
+        let path = self.sensor.as_ref();
+        path.map_or("the sensor".to_owned(), |path| path.display().to_string())
     }
 
     /// Whether rows and columns are both asked for on the command line.
@@ -181,12 +195,13 @@ impl SceneArgs {
     pub(super) fn read(&self) -> Result<(Sensor, Scene), InputError> {
         let (sensor, scene) = self.sources().read()?;
         self.sensor.warn_of_unusual(&sensor);
+        note_unusual(self.scene_name(), &scene.remarks());
         if let (Some(path), true) = (
             &self.scene,
             scene.objects.is_empty() && self.scene != Some("empty".into()),
         ) {
             note(format_args!(
-                "{} has no [[object]], so there is nothing to see; `gdtof scene` prints a scene with some",
+                "{} lacks [[object]], so the world is empty and no light returns; begin with a whole scene (`gdtof scene warehouse > my_scene.toml`, `gdtof scene --list` names others) and change it, or keep a built-in one and change keys with --set scene.lidar.pde=0.2",
                 path.display()
             ));
         }
@@ -210,11 +225,37 @@ impl SceneArgs {
     }
 }
 
+/// Notes what is probably in another unit.
+pub(super) fn note_unusual(source: impl Display, remarks: &[String]) {
+    said_remarks(&source.to_string(), remarks)
+        .iter()
+        .for_each(note);
+}
+
+/// What is built in, a line each.
+fn print_names<'a>(names: impl Iterator<Item = (&'a str, &'a str)>) -> anyhow::Result<()> {
+    let lines = names.map(|(name, what)| format!("{name:<20}{what}\n"));
+    Ok(say_file(lines.collect::<String>())?)
+}
+
+/// The text up to its first full stop.
+fn first_sentence(text: &str) -> &str {
+    let end = text.find(". ").unwrap_or(text.len());
+    text[..end].trim_end_matches('.')
+}
+
 /// `gdtof sensor`.
 ///
 /// # Errors
 /// Bad input.
 pub(super) fn print_sensor(args: PrintSensorArgs) -> anyhow::Result<()> {
+    if args.list {
+        return print_names(
+            CHIPS
+                .iter()
+                .map(|chip| (chip.name, first_sentence(chip.head))),
+        );
+    }
     let sensor = SensorArgs {
         sensor: args.chip.or(args.sensor.sensor),
         ..args.sensor
@@ -228,6 +269,9 @@ pub(super) fn print_sensor(args: PrintSensorArgs) -> anyhow::Result<()> {
 /// # Errors
 /// Bad input.
 pub(super) fn print_scene(args: PrintSceneArgs) -> anyhow::Result<()> {
+    if args.list {
+        return print_names(Scene::built_in());
+    }
     let args = args.scene.or_file(args.world);
     let (_, scene) = args.read()?;
     Ok(say_file(scene.commented_with(&args.notes()))?)

@@ -36,6 +36,7 @@ mod messages_help;
 mod mismatch_replays;
 #[cfg(unix)]
 mod no_file_blocks_a_command;
+mod odd_settings_are_noted;
 mod one_window_for_all;
 mod photons_reach_any_chip;
 mod pictures_agree;

@@ -213,7 +213,7 @@ fn a_scene_goes_by_its_place_and_one_without_objects_is_noted() {
     let counts = |out: &str| std::fs::read(here.join(out).join("histograms.npy")).unwrap();
     assert_eq!(counts("a"), counts("b"));
     let noted = run("scene.toml", "c");
-    assert!(noted.contains("scene.toml has no [[object]]"), "{noted}");
+    assert!(noted.contains("scene.toml lacks [[object]]"), "{noted}");
     assert_eq!(run("empty", "d"), "");
 }
 

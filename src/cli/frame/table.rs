@@ -41,6 +41,12 @@ pub(super) fn brief(
     if let Some(error_m) = summary.median_absolute_error_m {
         table.push("median error of these depths", format!("{error_m:.3} m"));
     }
+    if frame.depths_of_medium > 0 {
+        table.push(
+            "depths of the fog or smoke itself, before any surface",
+            part_of_whole(frame.depths_of_medium, summary.depths),
+        );
+    }
     if let Some(why) = without_a_depth(&summary) {
         table.push("surfaces without a depth", why);
     }

@@ -1,5 +1,6 @@
 //! `gdtof range` of any sensor's histograms: tables, arrays, and logs of evaluation kits.
 
+use std::f64::consts::LN_2;
 use std::ops::Range;
 use std::path::Path;
 
@@ -10,6 +11,7 @@ use super::args::RangeArgs;
 use super::crosstalk;
 use super::detector::{check_within, described_detector, description};
 use super::returns::{number_text, write_further, write_further_head};
+use crate::cli::settings::note_unusual;
 use crate::cli::voice::{note, say_json, say_unless_quiet};
 use crate::files::{HistogramFormat, InputError, OutputFile, ZoneCounts, ZoneHistograms};
 use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
@@ -17,6 +19,12 @@ use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
 use crate::system::median;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// How many times wider or narrower than the stated pulse echoes are said to be unlike it: chosen. Slanted surfaces widen echoes, too.
+const UNLIKE: f64 = 2.0;
+
+/// Bins from which on an echo is longer than one: chosen.
+const CLEARLY_A_BIN: f64 = 1.25;
 
 /// Counts that two histograms do not share by chance.
 const TOO_MANY_FOR_CHANCE: u64 = 200;
@@ -55,6 +63,7 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
     let described = description(args)?;
     let mut histograms = ZoneHistograms::read(&args.histograms, format, args.counts_per_unit)?;
     let whole = described_detector(args, &described, histograms.bins)?;
+    note_unusual("the detector", &described.remarks());
     let kept = kept.unwrap_or(0..histograms.bins);
     if kept.end > histograms.bins {
         let message = format!(
@@ -102,6 +111,11 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         .into_iter()
         .flatten()
         .collect();
+    if let Some(detector) = detectors.first()
+        && let Some(fwhm_s) = detector.echo_fwhm_s(histograms.histograms())
+    {
+        note_unlike_pulse(&whole.detector, fwhm_s);
+    }
     if let Some(path) = &args.out {
         write_csv(path, &zones)?;
     }
@@ -115,6 +129,31 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         table.push("zones with light of a cover glass", row);
     }
     Ok(say_unless_quiet(table)?)
+}
+
+/// Notes that echoes are far wider or narrower than the stated pulse.
+fn note_unlike_pulse(detector: &Detector, fwhm_s: f64) {
+    let stated_ns = 1e9 * detector.pulse_sigma_s * (8.0 * LN_2).sqrt();
+    let (seen_ns, bin_ns) = (1e9 * fwhm_s, 1e9 * detector.bin_s());
+    // What is shorter than a bin looks like a bin.
+    let is_wide = seen_ns > UNLIKE * stated_ns && seen_ns > CLEARLY_A_BIN * bin_ns;
+    let is_narrow = seen_ns.max(bin_ns) < stated_ns / UNLIKE;
+    if is_wide || is_narrow {
+        let times = if is_wide {
+            seen_ns / stated_ns
+        } else {
+            stated_ns / seen_ns
+        };
+        let than = if is_wide { "wider" } else { "narrower" };
+        let ratio = if times < 1000.0 {
+            format!("{times:.1} times {than}")
+        } else {
+            format!("far {than}")
+        };
+        note(format_args!(
+            "echoes are about {seen_ns:.1} ns wide at half maximum, {ratio} than pulse_fwhm_ns = {stated_ns:.3}; give the width of the echoes, with all jitter, so that depths and bounds hold"
+        ));
+    }
 }
 
 /// Zones whose histogram is that of the zone before them.
@@ -253,7 +292,7 @@ fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
             out,
             "capture,zone,depth_m,bound_m,spread_m,photons,confidence,no_depth,sensor_m"
         )?;
-        write_further_head(out)?;
+        write_further_head(out, "photons")?;
         writeln!(out)?;
         for zone in zones {
             let first = zone.returns.first();

@@ -68,13 +68,16 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     Ok(say_unless_quiet(table)?)
 }
 
+/// Photons of an echo in a laser cycle, as frame.json has them. Of other detectors they are those of the whole histogram.
+const PHOTONS: &str = "photons_per_cycle";
+
 fn write_csv(path: &Path, cols: usize, ranged: &ArrayDepths) -> anyhow::Result<()> {
     OutputFile::write_with(path, |out| {
         write!(
             out,
-            "row,col,start,true_m,guide_m,depth_m,bound_m,spread_m,photons,confidence,no_depth"
+            "row,col,start,true_m,guide_m,depth_m,bound_m,spread_m,{PHOTONS},confidence,no_depth"
         )?;
-        write_further_head(out)?;
+        write_further_head(out, PHOTONS)?;
         writeln!(out)?;
         for (at, pixel) in ranged.pixels.iter().enumerate() {
             write!(

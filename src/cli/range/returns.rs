@@ -9,10 +9,10 @@ pub(super) fn number_text(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| format!("{value:.6}"))
 }
 
-/// Names of the columns of the returns after the first.
-pub(super) fn write_further_head(out: &mut dyn Write) -> io::Result<()> {
+/// Names of the columns of the returns after the first, whose photons are `photons`.
+pub(super) fn write_further_head(out: &mut dyn Write, photons: &str) -> io::Result<()> {
     for n in 2..=RETURNS {
-        write!(out, ",depth_{n}_m,bound_{n}_m,photons_{n}")?;
+        write!(out, ",depth_{n}_m,bound_{n}_m,{photons}_{n}")?;
     }
     Ok(())
 }

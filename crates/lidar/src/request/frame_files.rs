@@ -116,6 +116,7 @@ impl<'a, P> FrameReport<'a, P> {
         let result = FrameResult {
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
+            depths_of_medium: frame.depths_of_medium,
             hints: &frame.hints,
             photons_expected: frame.photons_expected,
             work: frame.work,
@@ -153,17 +154,25 @@ impl<'a, P> FrameReport<'a, P> {
 }
 
 impl<P: Serialize> FrameReport<'_, P> {
-    /// Writes frame.json, histograms.npy and depth.png into `out`: `histograms` are rows x cols x bins.
+    /// Writes frame.json, histograms.npy and depth.png into `out`: `histograms` are rows x cols x bins. `scale_m` are the ends of the picture's
+    /// colours, m, instead of the shortest and the longest depth.
     ///
     /// # Errors
     /// When they cannot be written, or there are fewer or more counts than macropixels have.
-    pub fn write(&self, out: &Path, histograms: &[u16]) -> Result<(), InputError> {
+    pub fn write(
+        &self,
+        out: &Path,
+        histograms: &[u16],
+        scale_m: Option<(f32, f32)>,
+    ) -> Result<(), InputError> {
         let text = serde_json::to_string(self).expect("numbers and words");
         let exposed = &self.configuration.exposed;
         let drawn = FramePictures {
+            scene_name: &exposed.scene_name,
             mode: exposed.sensor.mode,
             laser_cycles: exposed.laser_cycles,
             array: &self.result.array,
+            scale_m,
         };
         drawn.write(out, &text, histograms)
     }
@@ -177,9 +186,11 @@ pub fn write_frame(out: &Path, report: &str, histograms: &[u16]) -> Result<(), I
     let read: RunReport<ExposureReport<IgnoredAny, Chip>, FrameArray<'_>> =
         parse_json("frame.json", report, "the report of a frame")?;
     let drawn = FramePictures {
+        scene_name: &read.configuration.scene_name,
         mode: read.configuration.sensor.mode,
         laser_cycles: read.configuration.laser_cycles,
         array: &read.result,
+        scale_m: None,
     };
     drawn.write(out, report, histograms)
 }
@@ -192,9 +203,11 @@ struct Chip {
 
 /// What files beside frame.json show of a frame.
 struct FramePictures<'a> {
+    scene_name: &'a str,
     mode: Mode,
     laser_cycles: u32,
     array: &'a FrameArray<'a>,
+    scale_m: Option<(f32, f32)>,
 }
 
 impl FramePictures<'_> {
@@ -231,11 +244,20 @@ fn depth_map(out: &Path, drawn: &FramePictures<'_>) -> Result<(), InputError> {
             (depth_m, None) => ImageCell::Depth(depth_m.unwrap_or_default() as f32),
         })
         .collect();
+    let depths_m = pixels.iter().filter_map(|pixel| pixel.measured_m);
+    let range_m = drawn.scale_m.unwrap_or_else(|| frame_scale_m(depths_m));
+    // A path is too long for a title.
+    let scene = Path::new(drawn.scene_name).file_name();
+    let scene = scene.map_or(drawn.scene_name.into(), |name| name.to_string_lossy());
+    let title = format!(
+        "{scene}, {} to {} m, {mode}, {} laser cycles",
+        range_m.0, range_m.1, drawn.laser_cycles
+    );
     let map = DepthImage {
-        title: &format!("Depth, {mode}, {} laser cycles", drawn.laser_cycles),
+        title: &title,
         cols,
         cells: &cells,
-        range_m: frame_scale_m(pixels.iter().filter_map(|pixel| pixel.measured_m)),
+        range_m,
         unit: "m",
         categories: &NoDepth::categories(),
         scale: (512 / rows.max(cols)).max(1),

@@ -22,6 +22,7 @@ pub use self::frame_files::{
 };
 pub use self::light::LightRequest;
 pub use self::sources::Sources;
+pub(crate) use self::sources::scene_key_named;
 pub(crate) use self::sources::{ReadAs, refuse_other_kind};
 pub use self::spelling::Spelling;
 pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};

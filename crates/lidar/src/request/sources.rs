@@ -75,6 +75,10 @@ impl Sources {
         };
         for assignment in &self.set {
             let option = format!("{} {assignment}", self.spelling.name("set"));
+            if let Some(meant) = of_the_other_kind(assignment) {
+                let message = format!("there is no such key; did you mean {meant}?");
+                return Err(InputError::new(option, message));
+            }
             if let Some(rest) = assignment.strip_prefix("sensor.") {
                 sensor.assign(rest, &option)?;
             } else if let Some(rest) = assignment.strip_prefix("scene.") {
@@ -132,6 +136,28 @@ impl Sources {
             None => "built-in street".to_owned(),
         }
     }
+}
+
+/// The name that a key of the scene has which is given as one of the sensor, or the other way round.
+fn of_the_other_kind(assignment: &str) -> Option<String> {
+    let (path, _) = assignment.split_once('=')?;
+    let (kind, rest) = path.trim().split_once('.')?;
+    let key = rest.rsplit('.').next()?;
+    match kind {
+        "sensor" if SensorConfig::key(key).is_none() => scene_key_named(key),
+        "scene" if Scene::key(rest).is_none() => {
+            SensorConfig::key(key).map(|key| format!("sensor.{}", key.name))
+        }
+        _ => None,
+    }
+}
+
+/// The whole name of the scene's key that is called `key`, if one section that is not a list has it.
+pub(crate) fn scene_key_named(key: &str) -> Option<String> {
+    let sections = Scene::SECTIONS.iter();
+    let mut plain = sections.filter(|section| !["object", "interferer"].contains(&section.name));
+    let section = plain.find(|section| section.keys.iter().any(|known| known.name == key))?;
+    Some(format!("scene.{}.{key}", section.name))
 }
 
 /// Whether something is the name of what is built in rather than a file. A file of such a name comes first; a folder does not,

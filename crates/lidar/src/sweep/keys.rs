@@ -7,7 +7,7 @@ use super::cell::Holds;
 use super::theory::TheorySettings;
 use crate::chip::SensorConfig;
 use crate::files::{instead_of, nearest};
-use crate::request::FrameRequest;
+use crate::request::{FrameRequest, scene_key_named};
 use crate::scene::Scene;
 use crate::settings::{Key, Range, Settings};
 use crate::system::WindowPolicy;
@@ -34,7 +34,11 @@ pub(super) struct TypedKey {
 /// There is none: what there is instead.
 pub(super) fn find(kind: StudyKind, name: &str) -> Result<TypedKey, String> {
     let (group, rest) = name.split_once('.').unwrap_or((name, ""));
-    let none = |there_are: String| Err(format!("{name} is not a key of a study; {there_are}"));
+    let none = |there_are: String| {
+        let meant = key_elsewhere(name).filter(|_| !there_are.contains("did you mean"));
+        let there_are = meant.map_or(there_are, |meant| format!("did you mean `{meant}`?"));
+        Err(format!("{name} is not a key of a study; {there_are}"))
+    };
     let all = |keys: &[Key]| -> String {
         let names: Vec<String> = keys.iter().map(|k| format!("{group}.{}", k.name)).collect();
         instead_of(name, names.iter().map(String::as_str))
@@ -122,6 +126,17 @@ pub(super) fn find(kind: StudyKind, name: &str) -> Result<TypedKey, String> {
         Range::OneOf(_) | Range::WordOrCurve(..) | Range::Text => Holds::Word,
     };
     Ok(TypedKey { key, holds })
+}
+
+/// The name in a study of the key whose last part is that of `name`, if there is one.
+fn key_elsewhere(name: &str) -> Option<String> {
+    let key = name.rsplit('.').next()?;
+    let is_of = |keys: &[Key]| keys.iter().any(|known| known.name == key);
+    let of_group = |group: &str, keys: &[Key]| is_of(keys).then(|| format!("{group}.{key}"));
+    of_group("sensor", SensorConfig::KEYS)
+        .or_else(|| scene_key_named(key))
+        .or_else(|| of_group("windows", WindowPolicy::KEYS))
+        .filter(|meant| meant != name)
 }
 
 /// A value of a key, as a plain number where it is a quantity.

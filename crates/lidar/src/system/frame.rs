@@ -169,6 +169,7 @@ struct FrameDepths {
     bin_s: f64,
     remark: Option<String>,
     hints: Vec<DepthHint>,
+    depths_of_medium: usize,
     took_s: f64,
 }
 
@@ -224,6 +225,7 @@ impl Plan<'_> {
             pixels: ranged.depths,
             remark: ranged.remark,
             hints: ranged.hints,
+            depths_of_medium: ranged.depths_of_medium,
             photons_expected: light.photons_expected(exposure),
             work: counted.exposed.work,
             kept: counted.kept,
@@ -356,10 +358,27 @@ impl Plan<'_> {
         Ok(FrameDepths {
             remark: circumstances.remark(),
             hints: circumstances.hints(),
+            depths_of_medium: self.depths_of_medium(light, &depths, ranger.bin_s()),
             bin_s: ranger.bin_s(),
             depths,
             took_s: clock.lap(),
         })
+    }
+
+    /// Depths of what fog or smoke sends back itself.
+    fn depths_of_medium(&self, light: &Light, depths: &[PixelDepth], bin_s: f64) -> usize {
+        if !self.settings.scene.medium.sends_light_back() {
+            return 0;
+        }
+        let bin_m = 0.5 * SPEED_OF_LIGHT_M_PER_S * bin_s;
+        let is_of_medium = |(pixel, depth): &(usize, &PixelDepth)| {
+            let seen = light.truth.surfaces[*pixel].iter();
+            let nearest_m = seen
+                .map(|surface| surface.range_m)
+                .fold(f64::INFINITY, f64::min);
+            depth.measured_m.is_some_and(|m| m < nearest_m - bin_m)
+        };
+        depths.iter().enumerate().filter(is_of_medium).count()
     }
 
     fn probe<A: Answer>(

@@ -8,6 +8,7 @@ mod drive;
 mod error;
 mod frame;
 mod light;
+mod lost_peaks;
 mod no_depth_pattern;
 pub mod pareto;
 mod pixel;

@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::lost_peaks::LostPeaks;
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::{EventType, Exposure, Mode, Sensor, SensorConfig, WindowLaw};
 use crate::guide::Guide;
@@ -104,6 +105,12 @@ impl Circumstances<'_> {
         if is_worth_it(NoDepth::Saturated) {
             let what = format!("are saturated: {}", self.saturated());
             hints.push(hint(NoDepth::Saturated, what));
+        }
+        if is_worth_it(NoDepth::NoSignificantPeak)
+            && let Some(why) = LostPeaks::new(self).and_then(|lost| lost.advice())
+        {
+            let what = format!("have no significant peak: {why}");
+            hints.push(hint(NoDepth::NoSignificantPeak, what));
         }
         hints
     }
@@ -262,20 +269,10 @@ impl Circumstances<'_> {
     /// where there is one.
     fn brightest(&self, reason: NoDepth) -> Option<(f64, &PixelLight)> {
         let law = WindowLaw::new(self.sensor, self.exposure);
-        let in_window = |pixel: &PixelDepth, light: &PixelLight| {
-            let window = pixel.start.and_then(|start| law.window(start).open());
-            let seen = window.map(|window| law.interval(&window));
-            let is_seen = |time: Time| seen.as_ref().is_none_or(|seen| seen.contains(&time));
-            let of_segments = light.segments().map(|segment| {
-                let echoes = segment.echoes().filter(|echo| is_seen(echo.arrival));
-                echoes.map(|echo| echo.photons).sum()
-            });
-            of_segments.fold(0.0, f64::max)
-        };
         let with_reason = self.pixels.iter().zip(self.light);
         with_reason
             .filter(|(pixel, _)| pixel.no_depth == Some(reason) && pixel.true_m.is_some())
-            .map(|(pixel, light)| (in_window(pixel, light), light))
+            .map(|(pixel, light)| (signal_in_window(&law, pixel, light), light))
             .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
@@ -293,6 +290,18 @@ impl Circumstances<'_> {
         });
         chances.into_iter().fold(0.0, f64::max)
     }
+}
+
+/// Photons of echoes that arrive in a laser cycle within a macropixel's window, or all where it has none.
+pub(super) fn signal_in_window(law: &WindowLaw, pixel: &PixelDepth, light: &PixelLight) -> f64 {
+    let window = pixel.start.and_then(|start| law.window(start).open());
+    let seen = window.map(|window| law.interval(&window));
+    let is_seen = |time: Time| seen.as_ref().is_none_or(|seen| seen.contains(&time));
+    let of_segments = light.segments().map(|segment| {
+        let echoes = segment.echoes().filter(|echo| is_seen(echo.arrival));
+        echoes.map(|echo| echo.photons).sum()
+    });
+    of_segments.fold(0.0, f64::max)
 }
 
 /// "from 3.0 m to 7.0 m" of the least and the greatest.
@@ -366,7 +375,7 @@ mod tests {
     fn rarer_reasons_that_settings_change_have_a_hint() {
         let short_sighted = frame("", |scene| scene.stereo.max_disparity_px = 180.0);
         assert_eq!(short_sighted.remark, None);
-        let [hint] = &short_sighted.hints[..] else {
+        let [hint, ..] = &short_sighted.hints[..] else {
             panic!("{:?}", short_sighted.hints)
         };
         for words in [

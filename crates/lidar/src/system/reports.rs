@@ -124,6 +124,8 @@ pub struct FrameResult<'a, P = ()> {
     pub(crate) summary: FrameSummary,
     pub(crate) remark: Option<&'a str>,
     pub(crate) hints: &'a [DepthHint],
+    #[serde(skip_serializing_if = "is_zero")]
+    pub(crate) depths_of_medium: usize,
     pub(crate) photons_expected: f64,
     pub(crate) work: EngineWork,
     pub(crate) timing: &'a VerdictReport,
@@ -144,6 +146,10 @@ pub struct FrameResult<'a, P = ()> {
     pub(crate) pair: Option<&'a P>,
     #[serde(flatten)]
     pub(crate) array: FrameArray<'a>,
+}
+
+fn is_zero(number: &usize) -> bool {
+    *number == 0
 }
 
 /// A frame's macropixels, last in its file.

@@ -58,6 +58,8 @@ pub struct Frame {
     pub remark: Option<String>,
     /// What would help against other reasons for missing depths: one for each that settings can change.
     pub hints: Vec<DepthHint>,
+    /// Depths that are light of fog or smoke itself: nearer than every surface that the macropixel sees, by more than a bin. 0 in clear air.
+    pub depths_of_medium: usize,
     /// Photons and dark counts that the light makes of the whole array on average.
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.

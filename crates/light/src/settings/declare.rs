@@ -56,11 +56,11 @@ pub const fn help(doc: &'static str) -> &'static str {
 ///
 /// ```text
 /// /// What of it can be told, for people.
-/// name: Type ["unit"] = default, in range, from "where the default comes from";
+/// name: Type ["unit"] = default, in range, usually (least, most), from "where the default comes from";
 /// ```
 ///
 /// The first paragraph of a field's doc comment is the key's help. The unit is left out where there is none, the range where the
-/// type is a [`Setting`], and the source where the default is chosen. The struct reads and writes itself by serde, and keys that a file
+/// type is a [`Setting`], what is usual where no unit could be mistaken, and the source where the default is chosen. The struct reads and writes itself by serde, and keys that a file
 /// leaves out have their default; it is [`Settings`](crate::settings::Settings), and its fields are as visible as itself. What stands in `.. { }` at the end are fields that are no keys.
 #[macro_export]
 macro_rules! keys {
@@ -70,7 +70,7 @@ macro_rules! keys {
             $(
                 $(#[$($attribute:tt)*])*
                 $key:ident: $type:ty $([$unit:literal])? = $default:expr
-                    $(, in $range:expr)? $(, from $source:expr)?;
+                    $(, in $range:expr)? $(, usually $usual:expr)? $(, from $source:expr)?;
             )*
             $(
                 .. {
@@ -98,6 +98,7 @@ macro_rules! keys {
                     what: $crate::settings::help(concat!($($crate::keys!(@doc $($attribute)*)),*)),
                     unit: concat!($($unit)?),
                     range: $crate::keys!(@range $type $(, $range)?),
+                    usual: $crate::keys!(@usual $($usual)?),
                     source: $crate::keys!(@source $($source)?),
                 },)*
             ];
@@ -117,6 +118,8 @@ macro_rules! keys {
     (@doc $($other:tt)*) => { "" };
     (@range $type:ty) => { <$type as $crate::settings::Setting>::RANGE };
     (@range $type:ty, $range:expr) => { $range };
+    (@usual) => { None };
+    (@usual $usual:expr) => { Some($usual) };
     (@source) => { "chosen" };
     (@source $source:expr) => { $source };
 }
@@ -188,7 +191,7 @@ mod tests {
             /// as there is light.
             ///
             /// What it costs is not told.
-            length_m: f64 ["m"] = 100.0, in Range::Within(0.0, 1e4), from "a map";
+            length_m: f64 ["m"] = 100.0, in Range::Within(0.0, 1e4), usually (1.0, 1e3), from "a map";
             /// Where to
             way: Way = Way::There;
             /// Rests, if any.
@@ -210,8 +213,10 @@ mod tests {
                 what,
                 unit,
                 range,
+                usual,
                 source,
             } = key;
+            assert_eq!(*usual, (*name == "length_m").then_some((1.0, 1e3)));
             format!("{name}: {what}; {range} {unit}. {source}")
         };
         let table: Vec<String> = Walk::KEYS.iter().map(told).collect();

@@ -2,7 +2,7 @@
 
 use toml::Value;
 
-use super::quantity;
+use super::quantity::{self, LikelyQuantity};
 use crate::files::{Misfit, in_plain_words, is_no_word, nearest, unknown_word};
 
 /// A key: what it is, in which unit, what it may be, and where its default comes from.
@@ -16,6 +16,8 @@ pub struct Key {
     pub unit: &'static str,
     /// What it may be.
     pub range: Range,
+    /// The least and the greatest size of what it is in use, besides 0; a value far from it is probably in another unit.
+    pub usual: Option<(f64, f64)>,
     /// Where its default comes from.
     pub source: &'static str,
 }
@@ -84,6 +86,16 @@ impl std::fmt::Display for Range {
     }
 }
 
+/// The numbers of a value, of lists too.
+fn numbers(value: &Value) -> Box<dyn Iterator<Item = f64> + '_> {
+    match value {
+        Value::Integer(number) => Box::new(std::iter::once(*number as f64)),
+        Value::Float(number) => Box::new(std::iter::once(*number)),
+        Value::Array(values) => Box::new(values.iter().flat_map(numbers)),
+        _ => Box::new(std::iter::empty()),
+    }
+}
+
 impl Key {
     /// A key; see its fields.
     pub(crate) const fn new(
@@ -98,6 +110,7 @@ impl Key {
             what,
             unit,
             range,
+            usual: None,
             source,
         }
     }
@@ -194,11 +207,46 @@ impl Key {
             Range::Limited(_, _, reason) if number >= 0.0 => format!(": {reason}"),
             _ => String::new(),
         };
+        let meant = quantity::likely_quantity(number, self.unit, |number| self.range.holds(number));
+        let meant = meant.map_or(String::new(), |meant| format!("; {}", self.advice(&meant)));
         Some(format!(
-            "{} = {} is impossible; give {}{unit}{because}",
+            "{} = {} is impossible; give {}{unit}{because}{meant}",
             self.name,
             in_short(number, 1e-6..1e15),
             self.range
+        ))
+    }
+
+    /// What to write for a quantity that may have been meant.
+    fn advice(&self, meant: &LikelyQuantity) -> String {
+        let number = in_short(meant.number, 1e-3..1e7);
+        format!(
+            "if you mean {}, give {number}{}",
+            meant.text,
+            self.after_number()
+        )
+    }
+
+    /// A sentence on a possible value that is far from every usual one, with the unit in which it would be usual.
+    pub fn remark(&self, value: &Value) -> Option<String> {
+        let (least, most) = self.usual?;
+        let is_usual = |number: f64| number == 0.0 || (least..=most).contains(&number.abs());
+        let unusual = numbers(value).filter(|number| !is_usual(*number));
+        let number = unusual.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let short = |x: f64| in_short(x, 1e-3..1e5);
+        let usual = match least {
+            0.0 => format!("sizes up to {}", short(most)),
+            _ => format!("{} to {}", short(least), short(most)),
+        };
+        let unit = self.after_number();
+        let advice = match quantity::likely_quantity(number, self.unit, is_usual) {
+            Some(meant) => self.advice(&meant),
+            None => "check its unit".to_owned(),
+        };
+        let number = in_short(number, 1e-3..1e5);
+        Some(format!(
+            "{} = {number}{unit} is far from the usual {usual}{unit}; {advice}",
+            self.name
         ))
     }
 }

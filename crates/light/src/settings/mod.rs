@@ -14,6 +14,7 @@ mod key;
 mod notes;
 mod print;
 mod quantity;
+mod remarks;
 mod schema;
 
 pub use crate::{keys, words};
@@ -23,4 +24,5 @@ pub use key::{Key, Range};
 pub use notes::Notes;
 pub use print::Section;
 pub use print::commented;
+pub use remarks::{remarks, said_remarks};
 pub use schema::schema;

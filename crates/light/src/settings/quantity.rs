@@ -135,6 +135,45 @@ pub(super) fn in_unit(text: &str, wanted: &str) -> Result<f64, String> {
         .map_err(|_| not_a_number())
 }
 
+/// A number that may have been meant in another unit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LikelyQuantity {
+    /// The number as it was given, with that unit.
+    pub(super) text: String,
+    /// The same in the wanted unit.
+    pub(super) number: f64,
+}
+
+/// The quantity for which `is_right` holds if `number` is in another unit than the wanted one. Of several such units it is one a thousand times
+/// larger or smaller, before others. `None` if there is no such unit.
+pub(super) fn likely_quantity(
+    number: f64,
+    wanted: &str,
+    is_right: impl Fn(f64) -> bool,
+) -> Option<LikelyQuantity> {
+    if !number.is_finite() || number == 0.0 {
+        return None;
+    }
+    let (dimension, wanted_power) = unit(wanted)?;
+    let (_, units) = UNITS.iter().find(|(name, _)| *name == dimension)?;
+    let mut others: Vec<_> = units.iter().filter(|(_, p)| *p != wanted_power).collect();
+    others.sort_by_key(|(_, power)| match (power - wanted_power).abs() {
+        3 => 0,
+        apart => apart,
+    });
+    let digits = if (1e-3..1e7).contains(&number.abs()) {
+        format!("{number}")
+    } else {
+        format!("{number:e}")
+    };
+    let quantity = |(symbol, _): &(&str, i32)| {
+        let text = format!("{digits} {symbol}");
+        let number = in_unit(&text, wanted).ok()?;
+        is_right(number).then_some(LikelyQuantity { text, number })
+    };
+    others.into_iter().find_map(quantity)
+}
+
 /// The number in front and what follows it.
 fn split(text: &str) -> (&str, &str) {
     let text = text.trim();

@@ -39,6 +39,9 @@ impl GuideKind {
     }
 }
 
+/// What people ask for who want no guide.
+const WITHOUT: [&str; 4] = ["none", "off", "no", "unguided"];
+
 /// All guides.
 pub const KINDS: &[GuideKind] = &[
     GuideKind {
@@ -123,6 +126,8 @@ pub fn parse(text: &str, source: &str) -> Result<Arc<dyn Guide>, InputError> {
                 "give each by itself: {}",
                 each.collect::<Vec<_>>().join(" ")
             )
+        } else if WITHOUT.contains(&name) {
+            "a chip without one opens every window at the same time: give mode = \"conventional\" and as many bins as stop_periods, as in the recipe \"Take a frame without a guide\"".to_owned()
         } else {
             instead_of(name, names())
         };
@@ -219,6 +224,8 @@ mod tests {
             ("lidar", "\"lidar\" is not a guide; give stereo, truth"),
             ("radar:beam=3", "unknown key `beam`; give"),
             ("radr", "\"radr\" is not a guide; did you mean `radar`?"),
+            ("none", "\"none\" is not a guide; a chip without one opens"),
+            ("unguided", "give mode = \"conventional\" and as many bins"),
             (
                 "stereo,radar",
                 "give each by itself: guide stereo guide radar",

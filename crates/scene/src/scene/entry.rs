@@ -9,7 +9,7 @@ use super::object::Object;
 use super::rig::Waypoint;
 use super::shape::{DepthMap, MapFiles, Mesh, Shape};
 use super::texture::{Pattern, Picture, Texture};
-use super::words::{LENGTH, PLACES, POSITION, SHARE, SPEED};
+use super::words::{LENGTH, NEAR_M, PLACES, POSITION, SHARE, SPEED, SPEEDS};
 use crate::files::placed;
 use crate::settings::Range::{Above, Within};
 use crate::settings::{Settings, keys, words};
@@ -56,7 +56,7 @@ words! {
 macro_rules! entry {
     ($(
         $(#[doc = $help:literal])+
-        $key:ident: $type:ty $([$unit:literal])? $(, in $range:expr)? $(, from $source:expr)?;
+        $key:ident: $type:ty $([$unit:literal])? $(, in $range:expr)? $(, usually $usual:expr)? $(, from $source:expr)?;
     )*) => {
         keys! {
             /// An `[[object]]` entry: one flat table, so that unknown keys are found at their own line.
@@ -70,7 +70,7 @@ macro_rules! entry {
                 $(
                     $(#[doc = $help])+
                     #[serde(skip_serializing_if = "Option::is_none")]
-                    $key: Option<$type> $([$unit])? = None $(, in $range)?,
+                    $key: Option<$type> $([$unit])? = None $(, in $range)? $(, usually $usual)?,
                         from entry!(@source $($source)?);
                 )*
             }
@@ -103,11 +103,11 @@ entry! {
     /// the second.
     texture_file: PathBuf;
     /// Edge of a checker, width of a stripe or image, size of the largest clouds; 0.5 m if left out.
-    texture_size_m: f64 ["m"], in LENGTH;
+    texture_size_m: f64 ["m"], in LENGTH, usually NEAR_M;
     /// Of a noise texture: equal seeds give equal clouds; 0 if left out.
     texture_seed: u32, in Within(0.0, 4_294_967_295.0);
     /// Shift of the pattern along the surface, [right, down]; none if left out.
-    texture_shift_m: (f64, f64) ["m"], in POSITION;
+    texture_shift_m: (f64, f64) ["m"], in POSITION, usually NEAR_M;
     /// Turn of the pattern on the surface; none if left out.
     texture_turn_deg: f64 ["deg"], in Within(-3600.0, 3600.0);
     /// Of a texture: the second material's reflectivity at the laser's wavelength; 0 if left out.
@@ -115,29 +115,29 @@ entry! {
     /// Of a texture: what the cameras see of the second material; as second_reflectivity if left out.
     second_grey: f64, in SHARE;
     /// Velocity in the world, [right, down, forward]; at rest if left out.
-    velocity_m_s: DVec3 ["m/s"], in SPEED;
+    velocity_m_s: DVec3 ["m/s"], in SPEED, usually SPEEDS;
     /// Positions over time, connected by straight lines: a list of [s, m right, m down, m forward] from its place.
     waypoints: Vec<Waypoint>, in PLACES;
     /// Of a ground: how far it lies below the lidar.
-    depth_m: f64 ["m"], in LENGTH;
+    depth_m: f64 ["m"], in LENGTH, usually NEAR_M;
     /// Of a plane, box, sphere or cylinder: its middle, of a mesh: its file's origin, of a map: its camera, [right, down, forward] of the lidar.
-    centre_m: DVec3 ["m"], in POSITION;
+    centre_m: DVec3 ["m"], in POSITION, usually NEAR_M;
     /// Of a plane: any vector at right angles to it; towards the lidar if left out.
     normal: DVec3, in POSITION;
     /// Of a plane: extent along its horizontal edge.
-    width_m: f64 ["m"], in LENGTH;
+    width_m: f64 ["m"], in LENGTH, usually NEAR_M;
     /// Of a plane: extent along its other edge; of a cylinder: its length; of a person: 1.72 m if left out.
-    height_m: f64 ["m"], in LENGTH;
+    height_m: f64 ["m"], in LENGTH, usually NEAR_M;
     /// Of a box: extents [right, down, forward] before it is turned.
-    size_m: DVec3 ["m"], in LENGTH;
+    size_m: DVec3 ["m"], in LENGTH, usually NEAR_M;
     /// Of a box, person, mesh or map: its turn about the vertical axis, the front to the right; none if left out, and a person walks forward.
     yaw_deg: f64 ["deg"], in Within(-360.0, 360.0);
     /// Of a sphere or cylinder: its radius.
-    radius_m: f64 ["m"], in LENGTH;
+    radius_m: f64 ["m"], in LENGTH, usually NEAR_M;
     /// Of a cylinder: any vector along it; upright if left out, as poles are.
     axis: DVec3, in POSITION;
     /// Of a person: where it stands, [right, down, forward] of the lidar.
-    foot_m: DVec3 ["m"], in POSITION;
+    foot_m: DVec3 ["m"], in POSITION, usually NEAR_M;
     /// Of a mesh: an OBJ file (x right, y up, z backwards), relative to the scene file.
     file: PathBuf;
     /// Of a mesh: the file's unit of length; 1 m if left out.

@@ -14,7 +14,9 @@ use super::rules::{check_object, check_rig, check_stereo};
 use super::settings::{Lidar, Light, Scene, Stereo};
 use super::words::FilterWord;
 use crate::files::{InputError, nearest};
-use crate::settings::{Document, Fault, Key, Notes, Range, Section, Settings, commented, schema};
+use crate::settings::{
+    Document, Fault, Key, Notes, Range, Section, Settings, commented, remarks, schema,
+};
 
 impl Scene {
     /// The built-in street, from 15 to 180 m, 50 klux.
@@ -105,6 +107,10 @@ impl Scene {
         faults.extend(check_rig(&scene.rig));
         faults.extend(check_wavelengths(&scene));
         for fault in &mut faults {
+            if let Some(section) = other_section(&fault.path).filter(|_| is_of_unknown_key(fault)) {
+                let key = fault.path.rsplit('.').next().unwrap_or_default();
+                fault.message = format!("unknown key `{key}`; did you mean {section}?");
+            }
             fault.message = place(document, &fault.path) + &fault.message;
         }
         document.complain(faults)?;
@@ -121,6 +127,15 @@ impl Scene {
         };
         let section = Scene::SECTIONS.iter().find(|known| known.name == section)?;
         section.keys.iter().find(|key| key.name == name).copied()
+    }
+
+    /// Sentences on values that are probably in another unit than their key has, and on a filter that is not for the laser.
+    pub fn remarks(&self) -> Vec<String> {
+        let of_units = remarks(Scene::SECTIONS, &self.table());
+        of_units
+            .into_iter()
+            .chain(self.lidar.remark_on_filter())
+            .collect()
     }
 
     /// All values as a TOML table.
@@ -147,6 +162,24 @@ impl Scene {
             &Scene::default().table(),
         )
     }
+}
+
+/// Whether nothing better than a list of names is known of an unknown key.
+fn is_of_unknown_key(fault: &Fault) -> bool {
+    fault.message.starts_with("unknown key `") && !fault.message.contains("did you mean")
+}
+
+/// The key of another section whose name is that of an unknown key at `path`, or the nearest to it.
+fn other_section(path: &str) -> Option<String> {
+    let (section, key) = (path.split('.').next()?, path.rsplit('.').next()?);
+    let others = Scene::SECTIONS.iter().filter(|other| other.name != section);
+    let keys = others.flat_map(|other| other.keys.iter().map(move |key| (other.name, key.name)));
+    let meant = nearest(key, keys.clone().map(|(_, key)| key))?;
+    let (section, key) = keys.clone().find(|(_, key)| *key == meant)?;
+    Some(match section {
+        "object" | "interferer" => format!("`{key}` of an [[{section}]]"),
+        _ => format!("`{key}` of [{section}]"),
+    })
 }
 
 /// What to do about the name of a section that is none.

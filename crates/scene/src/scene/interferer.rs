@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::vector::turned;
-use super::words::{POSITION, SPEED};
+use super::words::{DITHER_NS, ENERGY_UJ, FWHM_NS, NEAR_M, POSITION, SPEED, SPEEDS};
 use crate::photon::OtherLaser;
 use crate::settings::Range::{Above, Limited, Within};
 use crate::settings::{Fault, keys};
@@ -21,7 +21,7 @@ keys! {
         /// Name in messages and for --set.
         name: String = String::new(), from "-";
         /// Where it is, [right, down, forward] of the lidar.
-        place_m: DVec3 ["m"] = DVec3::ZERO, in POSITION, from "-";
+        place_m: DVec3 ["m"] = DVec3::ZERO, in POSITION, usually NEAR_M, from "-";
         /// Which way it looks, to the right of forward; 180 looks back at us.
         yaw_deg: f64 ["deg"] = 180.0, in Within(-360.0, 360.0), from "chosen: oncoming";
         /// How far upwards it looks.
@@ -31,25 +31,25 @@ keys! {
         /// Full height of its beam.
         beam_height_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: as the street's lidar";
         /// Pulses per second.
-        rate_hz: f64 ["Hz"] = 80e3, in Within(1.0, 1e7), from "thesis Table 14, the demonstrator";
+        rate_hz: f64 ["Hz"] = 80e3, in Within(1.0, 1e7), usually (100.0, 1e7), from "thesis Table 14, the demonstrator";
         /// How much faster its clock is than ours, parts per million.
         drift_ppm: f64 = 0.0, in Within(-1e5, 1e5), from "chosen: the worst case; crystals keep 20";
         /// Longest random delay of each of its pulses.
-        dither_ns: f64 ["ns"] = 0.0, in Within(0.0, 1e9), from "none";
+        dither_ns: f64 ["ns"] = 0.0, in Within(0.0, 1e9), usually DITHER_NS, from "none";
         /// When it sends a pulse, as a share of its period after the exposure begins; drawn from the frame's seed if left out.
         #[serde(skip_serializing_if = "Option::is_none")]
         phase: Option<f64> = None, in Within(0.0, 1.0), from "-";
         /// Energy of one pulse.
         pulse_energy_uj: f64 ["uJ"] = 20.0,
-            in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
+            in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"), usually ENERGY_UJ,
             from "chosen: as the street's lidar";
         /// Full width at half maximum of its Gaussian pulse.
-        pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), from "thesis 6.4.2";
+        pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), usually FWHM_NS, from "thesis 6.4.2";
         /// Wavelength of its laser, whose spectrum is as wide as ours; ours if left out. Needs a filter other than irradiance.
         #[serde(skip_serializing_if = "Option::is_none")]
         wavelength_nm: Option<f64> ["nm"] = None, in Within(100.0, 1e4), from "chosen: ours, the worst case";
         /// Velocity in the world, [right, down, forward].
-        velocity_m_s: DVec3 ["m/s"] = DVec3::ZERO, in SPEED, from "at rest";
+        velocity_m_s: DVec3 ["m/s"] = DVec3::ZERO, in SPEED, usually SPEEDS, from "at rest";
     }
 }
 

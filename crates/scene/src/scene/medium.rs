@@ -10,7 +10,7 @@
 
 use std::f64::consts::PI;
 
-use super::words::LENGTH;
+use super::words::{LENGTH, NEAR_M};
 use crate::settings::Range::Within;
 use crate::settings::keys;
 
@@ -25,7 +25,7 @@ keys! {
         /// Share of light that fog takes away per metre: 3.912 over the visibility.
         ///
         /// Of haze too, about the same in the near infrared as in the visible, because droplets are larger than either wavelength.
-        extinction_1_m: f64 ["1/m"] = 0.0, in Within(0.0, 10.0),
+        extinction_1_m: f64 ["1/m"] = 0.0, in Within(0.0, 10.0), usually (0.0, 2.0),
             from "clear air; Koschmieder's law";
         /// Share of light that fog sends straight back; extinction over 18.8 sr if left out.
         ///
@@ -37,7 +37,7 @@ keys! {
         rain_mm_h: f64 ["mm/h"] = 0.0, in Within(0.0, 500.0),
             from "ITU-R P.1814: 1.076 R^0.67 dB/km";
         /// Nearest fog that the laser lights up and the macropixels see.
-        overlap_m: f64 ["m"] = 0.5, in LENGTH, from "chosen: laser and lens stand side by side";
+        overlap_m: f64 ["m"] = 0.5, in LENGTH, usually NEAR_M, from "chosen: laser and lens stand side by side";
     }
 }
 
@@ -45,6 +45,11 @@ impl Medium {
     /// Whether light passes as through nothing.
     pub(crate) fn is_clear(&self) -> bool {
         self.total_extinction_1_m() == 0.0 && self.backscatter_1_m_sr() == 0.0
+    }
+
+    /// Whether droplets or smoke send light back by themselves.
+    pub fn sends_light_back(&self) -> bool {
+        self.backscatter_1_m_sr() > 0.0
     }
 
     /// Extinction of fog and rain together, 1/m.

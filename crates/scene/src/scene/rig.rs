@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::words::{PLACES, SPEED};
+use super::words::{PLACES, SPEED, SPEEDS};
 use crate::settings::Range::Within;
 use crate::settings::keys;
 
@@ -33,7 +33,7 @@ keys! {
     #[non_exhaustive]
     pub struct Rig {
         /// Velocity of lidar and cameras in the world, [right, down, forward] of how they look at time 0.
-        velocity_m_s: DVec3 ["m/s"] = DVec3::ZERO, in SPEED, from "at rest";
+        velocity_m_s: DVec3 ["m/s"] = DVec3::ZERO, in SPEED, usually SPEEDS, from "at rest";
         /// How fast lidar and cameras turn to the right.
         yaw_rate_deg_s: f64 ["deg/s"] = 0.0, in Within(-3600.0, 3600.0), from "at rest";
         /// Positions of lidar and cameras over time, connected by straight lines: a list of [s, m right, m down, m

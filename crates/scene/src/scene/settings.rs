@@ -11,8 +11,8 @@ use super::medium::Medium;
 use super::object::Object;
 use super::rig::Rig;
 use super::words::{
-    BeamWord, CHOSEN, FilterWord, POSITION, PdeWord, PulseWord, SHARE, StrayWord, TABLE_12,
-    VignettingWord,
+    BeamWord, CHOSEN, DITHER_NS, ENERGY_UJ, FWHM_NS, FilterWord, NEAR_M, POSITION, PdeWord,
+    PulseWord, SHARE, StrayWord, TABLE_12, VignettingWord,
 };
 use crate::photon::{Convention, Spot};
 use crate::settings::Range::{Above, Limited, Within, WordOrCurve};
@@ -67,13 +67,13 @@ keys! {
         wavelength_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4),
             from "thesis 3.2, a dip of the solar spectrum";
         /// Full width at half maximum of the laser's Gaussian spectrum; 0 is a line.
-        laser_fwhm_nm: f64 ["nm"] = 0.0, in Within(0.0, 1000.0), from "chosen: a line";
+        laser_fwhm_nm: f64 ["nm"] = 0.0, in Within(0.0, 1000.0), usually (1e-3, 100.0), from "chosen: a line";
         /// Growth of the laser's wavelength with temperature; edge emitters have 0.3 nm/K.
         laser_drift_nm_k: f64 ["nm/K"] = 0.08, in Within(-10.0, 10.0),
             from "thesis Table 4, a VCSEL";
         /// Energy of one laser pulse over the whole field of view.
         pulse_energy_uj: f64 ["uJ"] = 100.0,
-            in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
+            in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"), usually ENERGY_UJ,
             from "chosen: class 1 at 10 frames a second of 1000 pulses";
         /// Most frames a second: the laser rests where the chip would be faster. 0 is as many as the chip takes.
         frame_rate_hz: f64 ["Hz"] = 10.0, in Within(0.0, 1e6), from CHOSEN;
@@ -84,16 +84,16 @@ keys! {
         pulse_energy_spread: f64 = 0.0, in Within(0.0, 0.5), from "none in the thesis";
         /// Full width at half maximum of the Gaussian pulse, jitter included; with a measured pulse, of the jitter
         /// alone.
-        pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), from "thesis 6.4.2";
+        pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), usually FWHM_NS, from "thesis 6.4.2";
         /// Full width at half maximum of the SPADs' Gaussian timing jitter, on top of the pulse's width.
-        spad_jitter_fwhm_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6),
+        spad_jitter_fwhm_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), usually (1.0, 1e4),
             from "none in the thesis; Sun et al. 2019 (doi 10.1109/JEDS.2019.2895151) have 110 ps in 180 nm CMOS";
         /// Share of the photons whose carrier diffuses to the junction, so that the avalanche is late; cohort refuses them.
         spad_tail_share: f64 = 0.0, in SHARE, from "none in the thesis; Cova et al. 1996 (doi 10.1364/AO.35.001956)";
         /// Time constant of the exponential delay of these avalanches.
-        spad_tail_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), from "none in the thesis; Cova et al. 1996";
+        spad_tail_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), usually (1.0, 1e5), from "none in the thesis; Cova et al. 1996";
         /// Standard deviation of the laser's delay after STOP, on top of the pulse's width.
-        trigger_jitter_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), from "none in the thesis";
+        trigger_jitter_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), usually (0.1, 1e5), from "none in the thesis";
         /// Laser pulse.
         ///
         /// The centre of mass of a measured one leaves with the STOP edge.
@@ -107,9 +107,9 @@ keys! {
         /// Full width at half maximum of a Gaussian beam.
         beam_fwhm_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: the field of view";
         /// Longest random wait before each laser pulse, against other lidars.
-        dither_ns: f64 ["ns"] = 0.0, in Within(0.0, 1e9), from "none";
+        dither_ns: f64 ["ns"] = 0.0, in Within(0.0, 1e9), usually DITHER_NS, from "none";
         /// Width of the laser's apparent source, for the safety of eyes; 0 is a point, the worst.
-        laser_source_mm: f64 ["mm"] = 12.0, in Within(0.0, 1000.0), from "chosen: an array of VCSELs behind a diffuser";
+        laser_source_mm: f64 ["mm"] = 12.0, in Within(0.0, 1000.0), usually (0.02, 300.0), from "chosen: an array of VCSELs behind a diffuser";
         /// Photon detection efficiency of the SPADs at the laser's wavelength.
         pde: f64 = 0.185, in SHARE, from "thesis Table 6";
         /// Photon detection efficiency over wavelength, for sunlight.
@@ -122,7 +122,7 @@ keys! {
         /// Standard deviation of a SPAD's detection efficiency, relative to the mean; window takes some 12 times as long with it.
         pde_spread: f64 = 0.0, in Within(0.0, 1.0), from "none in the thesis";
         /// Diameter of the lens aperture.
-        lens_diameter_mm: f64 ["mm"] = 4.0, in Above(0.0, 1e5), from CHOSEN;
+        lens_diameter_mm: f64 ["mm"] = 4.0, in Above(0.0, 1e5), usually (0.1, 500.0), from CHOSEN;
         /// Focal length over diameter of the lens.
         lens_f_number: f64 = 2.2, in Above(0.0, 1e4), from CHOSEN;
         /// Share of the light that lens and filter let through.
@@ -156,7 +156,7 @@ keys! {
         /// Centre of the filter, if it is given as a shape.
         filter_centre_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4), from "the laser";
         /// Full width at half maximum of the filter, if it is given as a shape.
-        filter_fwhm_nm: f64 ["nm"] = 10.0, in Above(0.0, 1e4);
+        filter_fwhm_nm: f64 ["nm"] = 10.0, in Above(0.0, 1e4), usually (0.01, 1000.0);
         /// Growth of the filter's wavelengths with temperature.
         filter_drift_nm_k: f64 ["nm/K"] = 0.02, in Within(-10.0, 10.0),
             from "chosen: a hard-coated filter has 0.01 to 0.03";
@@ -211,6 +211,32 @@ impl Lidar {
         }
     }
 
+    /// What is odd about the laser's wavelength beside the filter's, if anything.
+    pub(super) fn remark_on_filter(&self) -> Option<String> {
+        let laser_nm = self.wavelength_nm;
+        let CurveSetting::Word(filter) = &self.filter else {
+            return None;
+        };
+        let by_default = Lidar::default();
+        let (centre_nm, fwhm_nm, advice) = if filter.shape().is_some() {
+            (
+                self.filter_centre_nm,
+                self.filter_fwhm_nm,
+                format!("give filter_centre_nm = {laser_nm}"),
+            )
+        } else if self.solar_irradiance_w_m2 == by_default.solar_irradiance_w_m2 {
+            let advice = format!(
+                "give filter = \"top_hat\" with filter_centre_nm = {laser_nm}, or solar_irradiance_w_m2 of that band"
+            );
+            (by_default.wavelength_nm, by_default.filter_fwhm_nm, advice)
+        } else {
+            return None;
+        };
+        ((laser_nm - centre_nm).abs() > fwhm_nm).then(|| {
+            format!("in [lidar], the laser has {laser_nm} nm, and sunlight comes through a filter at {centre_nm} nm, {fwhm_nm} nm wide; {advice}")
+        })
+    }
+
     /// The optics of the thesis's demonstrator, before HSLIDAR's 64×32 macropixels (4.9, 6.3.1, Table 14).
     ///
     /// Published: macropixels of 114 µm × 54 µm, 25 mm focal length, 940 nm with a pulse of 4.5 ns, a filter of 10 nm, 3.5 % PDE, and
@@ -256,9 +282,9 @@ keys! {
         /// none.
         third_camera_baseline_m: f64 ["m"] = 0.0, in Within(0.0, MOST_BASELINE_M), from "none in Table 12; thesis 7.3.1 proposes one";
         /// Focal length of both lenses.
-        focal_mm: f64 ["mm"] = 12.0, in Above(0.0, 1e5), from TABLE_12;
+        focal_mm: f64 ["mm"] = 12.0, in Above(0.0, 1e5), usually (0.5, 2000.0), from TABLE_12;
         /// Pixel pitch of both cameras.
-        pixel_pitch_um: f64 ["um"] = 3.45, in Above(0.0, 1e5), from TABLE_12;
+        pixel_pitch_um: f64 ["um"] = 3.45, in Above(0.0, 1e5), usually (0.3, 100.0), from TABLE_12;
         /// Columns of an image.
         width: u32 ["px"] = 1440, in Within(1.0, 16_384.0), from TABLE_12;
         /// Rows of an image.
@@ -279,7 +305,7 @@ keys! {
         max_disparity_px: f64 ["px"] = 232.0, in Above(0.0, 1e5),
             from "chosen: the disparity at 15 m, where the thesis's rig begins to see";
         /// Place of the principal camera, [right, down, forward] of the lidar.
-        position_m: DVec3 ["m"] = DVec3::ZERO, in POSITION, from CHOSEN;
+        position_m: DVec3 ["m"] = DVec3::ZERO, in POSITION, usually NEAR_M, from CHOSEN;
         /// By how much the right camera has turned outwards since calibration.
         yaw_error_deg: f64 ["deg"] = 0.0, in Within(-45.0, 45.0), from "thesis Fig. 70; none";
         /// By how much the right camera has turned upwards.

@@ -101,6 +101,21 @@ pub(super) const CHOSEN: &str = "chosen for the street";
 pub(super) const TABLE_12: &str = "thesis Table 12";
 pub(super) const LENGTH: Range = Range::Above(0.0, FAR_M);
 pub(super) const POSITION: Range = Range::Within(-FAR_M, FAR_M);
+/// Lengths and places of scenes that a lidar may see, m; a file in millimetres has larger ones.
+pub(super) const NEAR_M: (f64, f64) = (0.0, 1000.0);
+
+/// Speeds of what moves on roads and in the air, m/s.
+pub(super) const SPEEDS: (f64, f64) = (0.0, 300.0);
+
+/// Widths of laser pulses at half maximum, ns.
+pub(super) const FWHM_NS: (f64, f64) = (0.01, 500.0);
+
+/// Random waits before laser pulses, ns.
+pub(super) const DITHER_NS: (f64, f64) = (0.01, 1e5);
+
+/// Energies of laser pulses, uJ: from chips that see some metres to large flash lidars.
+pub(super) const ENERGY_UJ: (f64, f64) = (1e-3, 2e4);
+
 pub(super) const SHARE: Range = Range::Within(0.0, 1.0);
 pub(super) const SPEED: Range = Range::Within(-1e4, 1e4);
 pub(super) const PLACES: Range = Range::Within(-FAR_M, FAR_M);

@@ -175,7 +175,7 @@ keys! {
         /// SPAD dead time and width of a SPAD_RAW pulse.
         ///
         /// No shorter than the front end follows, and longer than a CLK period if no photons are to cancel.
-        dead_time_ns: f64 ["ns"] = 8.0, in Above(0.0, 1e6);
+        dead_time_ns: f64 ["ns"] = 8.0, in Above(0.0, 1e6), usually (0.5, 2000.0);
         /// Standard deviation of the SPADs' dead times over the array, relative to their mean; each is Gaussian, cut off at four of them.
         ///
         /// SPAD_RAW pulses are as wide as the shortest dead time. For the engines window, gate and cycle.
@@ -188,7 +188,7 @@ keys! {
         /// Probability that an avalanche has an afterpulse.
         afterpulse_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
         /// Time constant of afterpulses after the dead time.
-        afterpulse_time_ns: f64 ["ns"] = 5.0, in Within(0.0, 1e6);
+        afterpulse_time_ns: f64 ["ns"] = 5.0, in Within(0.0, 1e6), usually (0.1, 1e4);
         /// Activation energy of the traps behind afterpulses: with the junction's temperature their time constant falls, and more are released within the dead time.
         ///
         /// At 50 degC, probability and time constant are those given.
@@ -236,9 +236,9 @@ keys! {
         /// the load asks for.
         liberty_cells: String = String::new(), from "chosen: none";
         /// Slew of a macropixel's inputs with a library; 0 is that of its smallest inverter which drives four of its kind.
-        input_slew_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e5);
+        input_slew_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e5), usually (0.5, 1e4);
         /// Capacitance of wires with a library, for each pin that a net leads to.
-        wire_ff: f64 ["fF"] = 0.0, in Within(0.0, 1e4), from "chosen: pins only, as before layout";
+        wire_ff: f64 ["fF"] = 0.0, in Within(0.0, 1e4), usually (0.01, 1000.0), from "chosen: pins only, as before layout";
     }
 }
 

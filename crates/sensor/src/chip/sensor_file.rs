@@ -12,7 +12,7 @@ use super::timing::library_files::{library_files, library_setting};
 use super::timing::silicon::Silicon;
 use crate::files::{InputError, placed};
 use crate::photon::{SIDES, count_bits};
-use crate::settings::{Document, Fault, Key, Notes, Section, Settings, commented, schema};
+use crate::settings::{Document, Fault, Key, Notes, Section, Settings, commented, remarks, schema};
 
 /// What is impossible about a sensor, and what would be possible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -267,6 +267,11 @@ impl SensorConfig {
         }
         document.complain(faults)?;
         Ok(config)
+    }
+
+    /// Sentences on values that are probably in another unit than their key has.
+    pub fn remarks(&self) -> Vec<String> {
+        remarks(&[Self::SECTION], &self.table())
     }
 
     /// What there is to know of a key of a sensor file, if it is one.

@@ -15,6 +15,7 @@
 
 mod crosstalk;
 mod description;
+mod echo_width;
 mod mean;
 
 use std::ops::Range;

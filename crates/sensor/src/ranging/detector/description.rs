@@ -15,30 +15,32 @@ use std::f64::consts::LN_2;
 use serde::{Deserialize, Serialize};
 
 use super::{Coincidence, CountedEvents, Detector};
+use crate::settings::Range::{OneOf, Text, Within};
+use crate::settings::{Section, Settings, keys, remarks};
 
 /// The longest bin over the mean one, and the mean one over the shortest: chosen. The search for peaks would see little in more unequal ones.
 const MOST_UNEQUAL: f64 = 4.0;
 
-/// A detector in the words of its user; what is missing has its default, or is asked for.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DetectorDescription {
-    /// Length of a bin.
-    pub bin_width_ns: Option<f64>,
-    /// Where bins begin, and the last one ends, after the centre of the laser pulse has left.
-    pub bin_edges_ns: Option<Vec<f64>>,
-    /// When bin 0 of equal bins begins after the centre of the laser pulse has left; 0 if missing.
-    pub start_ns: Option<f64>,
-    /// Full width at half maximum of the laser pulse with all jitter.
-    pub pulse_fwhm_ns: Option<f64>,
-    /// Which events count; every one if missing.
-    pub counts: Option<CountedEvents>,
-    /// Laser cycles of a histogram.
-    pub laser_cycles: Option<u32>,
-    /// Counts at which a bin stops.
-    pub most_counts: Option<u32>,
-    /// What an event is, if it is not a photon.
-    pub coincidence: Option<DescribedCoincidence>,
+keys! {
+    /// A detector in the words of its user; what is missing has its default, or is asked for.
+    pub struct DetectorDescription {
+        /// Length of a bin.
+        bin_width_ns: Option<f64> ["ns"] = None, in Within(1e-3, 1e6), usually (0.005, 200.0);
+        /// Where bins begin, and the last one ends, after the centre of the laser pulse has left.
+        bin_edges_ns: Option<Vec<f64>> ["ns"] = None, in Within(-1e9, 1e9), usually (0.0, 1e5);
+        /// When bin 0 of equal bins begins after the centre of the laser pulse has left; 0 if missing.
+        start_ns: Option<f64> ["ns"] = None, in Within(-1e9, 1e9), usually (0.0, 1e5);
+        /// Full width at half maximum of the laser pulse with all jitter.
+        pulse_fwhm_ns: Option<f64> ["ns"] = None, in Within(0.0, 1e6), usually (0.01, 500.0);
+        /// Which events count; every one if missing.
+        counts: Option<CountedEvents> = None, in OneOf(&["every", "first"]);
+        /// Laser cycles of a histogram.
+        laser_cycles: Option<u32> = None, in Within(1.0, u32::MAX as f64);
+        /// Counts at which a bin stops.
+        most_counts: Option<u32> = None, in Within(1.0, u32::MAX as f64);
+        /// What an event is, if it is not a photon.
+        coincidence: Option<DescribedCoincidence> = None, in Text;
+    }
 }
 
 /// SPADs that fire together.
@@ -64,6 +66,12 @@ pub struct BadDetector {
 }
 
 impl DetectorDescription {
+    /// Sentences on values that are probably in another unit than their key has.
+    pub fn remarks(&self) -> Vec<String> {
+        let values = toml::Table::try_from(self).expect("numbers and words");
+        remarks(&[Section::new("", "A detector", Self::KEYS)], &values)
+    }
+
     /// The detector with `bins` bins.
     ///
     /// # Errors
@@ -71,7 +79,7 @@ impl DetectorDescription {
     pub fn detector(&self, bins: usize) -> Result<Detector, BadDetector> {
         let edges_s = self.edges_s(bins)?;
         let fwhm_ns = needed("pulse_fwhm_ns", self.pulse_fwhm_ns)?;
-        check_within("pulse_fwhm_ns", fwhm_ns, (0.0, 1e6))?;
+        check_range("pulse_fwhm_ns", fwhm_ns)?;
         let all_ns = 1e9 * (edges_s[bins] - edges_s[0]);
         if fwhm_ns > 0.5 * all_ns * (1.0 + 1e-9) {
             let message = format!(
@@ -111,9 +119,9 @@ impl DetectorDescription {
     fn edges_s(&self, bins: usize) -> Result<Vec<f64>, BadDetector> {
         let Some(edges_ns) = &self.bin_edges_ns else {
             let bin_ns = needed("bin_width_ns", self.bin_width_ns)?;
-            check_within("bin_width_ns", bin_ns, (1e-3, 1e6))?;
+            check_range("bin_width_ns", bin_ns)?;
             let start_ns = self.start_ns.unwrap_or(0.0);
-            check_within("start_ns", start_ns, (-1e9, 1e9))?;
+            check_range("start_ns", start_ns)?;
             return Ok(Detector::equal_edges_s(
                 bins,
                 1e-9 * start_ns,
@@ -185,6 +193,17 @@ fn bad(key: &'static str, message: impl Into<String>) -> BadDetector {
 
 fn needed(key: &'static str, value: Option<f64>) -> Result<f64, BadDetector> {
     value.ok_or_else(|| bad(key, "is needed to make depths of bins; give it"))
+}
+
+/// Checks a value against the range of its key.
+fn check_range(name: &'static str, value: f64) -> Result<(), BadDetector> {
+    let key = DetectorDescription::KEYS
+        .iter()
+        .find(|key| key.name == name);
+    let fault = key.and_then(|key| key.fault(&value.into()));
+    let Some(fault) = fault else { return Ok(()) };
+    let message = fault.strip_prefix(&format!("{name} = ")).unwrap_or(&fault);
+    Err(bad(name, message))
 }
 
 fn check_within(
