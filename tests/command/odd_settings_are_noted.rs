@@ -135,12 +135,10 @@ fn a_pulse_unlike_the_echoes_is_noted() {
         ("20", "times narrower than pulse_fwhm_ns = 20"),
     ] {
         let (_, error) = said(here, &range("1", pulse_fwhm_ns));
-        let note = error
-            .lines()
-            .find(|line| line.starts_with("echoes are about"));
+        let note = error.lines().find(|line| line.contains("echoes are about"));
         let note = note.unwrap_or_else(|| panic!("{pulse_fwhm_ns}: {error}"));
         assert!(note.contains(says), "{note}");
-        let seen_ns: f64 = note.split(' ').nth(3).unwrap().parse().unwrap();
+        let seen_ns: f64 = note.split(' ').nth(4).unwrap().parse().unwrap();
         assert!((1.4..2.6).contains(&seen_ns), "{note}");
     }
     for pulse_fwhm_ns in ["1.5", "2", "3"] {
@@ -154,20 +152,11 @@ fn a_filter_for_another_laser_is_noted() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     let filter = "--set scene.lidar.filter=top_hat";
-    for (words, advice) in [
-        (
-            "scene --set scene.lidar.wavelength_nm=905",
-            "filter = \"top_hat\" with filter_centre_nm = 905",
-        ),
-        (
-            &format!("scene --set scene.lidar.wavelength_nm=905 {filter}"),
-            "give filter_centre_nm = 905",
-        ),
-    ] {
-        let (_, error) = said(here, words);
-        assert!(error.contains("the laser has 905 nm"), "{words}: {error}");
-        assert!(error.contains(advice), "{words}: {error}");
-    }
+    let words = "scene --set scene.lidar.wavelength_nm=905";
+    let (_, error) = said(here, words);
+    assert!(error.contains("the laser has 905 nm"), "{error}");
+    let advice = "filter = \"top_hat\" with filter_centre_nm = 905";
+    assert!(error.contains(advice), "{error}");
     for words in [
         "scene --set scene.lidar.wavelength_nm=944".to_owned(),
         "scene --set scene.lidar.wavelength_nm=905 --set scene.lidar.solar_irradiance_w_m2=6"

@@ -157,7 +157,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(crate::cases::cases(20)))]
+    #![proptest_config(ProptestConfig::with_cases(crate::cases::cases(40)))]
 
     #[test]
     fn in_cycles_as_short_as_the_window_too(case in cases(60, 4.0), more in more()) {

@@ -1,13 +1,15 @@
 //! How wide the echoes of histograms are, whatever pulse was stated.
 //!
 //! ```text
-//!   each histogram, less its median, laid with its fullest bin over 0:
+//!   each histogram, less its median, laid with the middle of its bins above half over 0:
 //!
 //!                    ▂▅█▅▂          the sum of all has its full width at half maximum in time,
 //!   ────────────┄┄┄┄┄┄┄0┄┄┄┄┄┄──    less what the length of a bin adds (in squares)
 //! ```
 //!
-//! A bin is spread over its length, and echoes lie anywhere in a bin: this adds about a bin to the width.
+//! Counts are spread over the length of their bin. That adds a twelfth of its square to the variance.
+
+use std::f64::consts::LN_2;
 
 use super::Detector;
 
@@ -53,7 +55,16 @@ impl Detector {
                 .iter()
                 .map(|density| (density - level).max(0.0))
                 .sum::<f64>();
-            let centre_s = 0.5 * (self.edges_s[fullest] + self.edges_s[fullest + 1]);
+            let is_above = |bin: &usize| densities[*bin] - level > 0.5 * above;
+            let earlier = (0..fullest).rev().take_while(is_above);
+            let later = (fullest..bins).take_while(is_above);
+            let (mut weight, mut moment_s) = (0.0, 0.0);
+            for bin in earlier.chain(later) {
+                let counts = densities[bin] - level;
+                weight += counts;
+                moment_s += counts * 0.5 * (self.edges_s[bin] + self.edges_s[bin + 1]);
+            }
+            let centre_s = moment_s / weight;
             let cell = |time_s: f64| {
                 let cells = ((time_s - centre_s) / bin_s * FINE as f64).round();
                 (cells + middle as f64).clamp(0.0, (sum.len() - 1) as f64) as usize
@@ -76,7 +87,8 @@ impl Detector {
             .rev()
             .position(|cell| is_below(&cell))?;
         let fwhm_bins = (after + before) as f64 / FINE as f64;
-        Some(bin_s * (fwhm_bins * fwhm_bins - 1.0).max(0.25).sqrt())
+        let of_a_bin = 8.0 * LN_2 / 12.0;
+        Some(bin_s * (fwhm_bins * fwhm_bins - of_a_bin).max(0.25).sqrt())
     }
 }
 
