@@ -106,10 +106,11 @@ impl Circumstances<'_> {
             let what = format!("are saturated: {}", self.saturated());
             hints.push(hint(NoDepth::Saturated, what));
         }
-        if is_worth_it(NoDepth::NoSignificantPeak)
-            && let Some(why) = LostPeaks::new(self).and_then(|lost| lost.advice())
-        {
-            let what = format!("have no significant peak: {why}");
+        if is_worth_it(NoDepth::NoSignificantPeak) {
+            let what = format!(
+                "have no significant peak: {}",
+                LostPeaks::new(self).advice()
+            );
             hints.push(hint(NoDepth::NoSignificantPeak, what));
         }
         hints

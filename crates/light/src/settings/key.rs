@@ -207,7 +207,10 @@ impl Key {
             Range::Limited(_, _, reason) if number >= 0.0 => format!(": {reason}"),
             _ => String::new(),
         };
-        let meant = quantity::likely_quantity(number, self.unit, |number| self.range.holds(number));
+        // A number of something is no share, which may be in per cent.
+        let is_number = self.unit.is_empty() && self.range.holds(2.0);
+        let is_possible = |number: f64| !is_number && self.range.holds(number);
+        let meant = quantity::likely_quantity(number, self.unit, is_possible);
         let meant = meant.map_or(String::new(), |meant| format!("; {}", self.advice(&meant)));
         Some(format!(
             "{} = {} is impossible; give {}{unit}{because}{meant}",
