@@ -3,7 +3,7 @@
 //! A number of laser cycles is not advised. Half of such surfaces are seen beside others or through the end of their window, and the photons of their
 //! echoes do not tell how many more they need. 4.5 and 8.2 times as many, reckoned from them, brought 16 % and 25 % a depth, not half.
 
-use super::pixel::{NoDepth, PixelDepth};
+use super::pixel::NoDepth;
 use super::remark::{Circumstances, signal_in_window};
 use crate::chip::WindowLaw;
 use crate::ranging::Response;
@@ -77,7 +77,7 @@ impl LostPeaks {
         };
         let parts = self.surfaces.chunks(part);
         let lost_parts = parts.clone().rev().take_while(is_lost).count();
-        let first = parts.rev().take(lost_parts).last()?;
+        let first = parts.rev().take(lost_parts).next_back()?;
         Some(first[0].range_m)
     }
 }
