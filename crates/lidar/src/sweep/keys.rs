@@ -35,7 +35,7 @@ pub(super) struct TypedKey {
 pub(super) fn find(kind: StudyKind, name: &str) -> Result<TypedKey, String> {
     let (group, rest) = name.split_once('.').unwrap_or((name, ""));
     let none = |there_are: String| {
-        let meant = key_elsewhere(name).filter(|_| !there_are.contains("did you mean"));
+        let meant = key_elsewhere(name);
         let there_are = meant.map_or(there_are, |meant| format!("did you mean `{meant}`?"));
         Err(format!("{name} is not a key of a study; {there_are}"))
     };

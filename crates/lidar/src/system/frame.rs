@@ -372,11 +372,9 @@ impl Plan<'_> {
         }
         let bin_m = 0.5 * SPEED_OF_LIGHT_M_PER_S * bin_s;
         let is_of_medium = |(pixel, depth): &(usize, &PixelDepth)| {
-            let seen = light.truth.surfaces[*pixel].iter();
-            let nearest_m = seen
-                .map(|surface| surface.range_m)
-                .fold(f64::INFINITY, f64::min);
-            depth.measured_m.is_some_and(|m| m < nearest_m - bin_m)
+            let seen = &light.truth.surfaces[*pixel];
+            let is_before_all = |m: f64| seen.iter().all(|surface| m < surface.range_m - bin_m);
+            depth.measured_m.is_some_and(is_before_all)
         };
         depths.iter().enumerate().filter(is_of_medium).count()
     }

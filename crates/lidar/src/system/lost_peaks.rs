@@ -1,7 +1,7 @@
 //! What would help surfaces whose peak is not significant: up to where this light reaches, and whether less background would help, too.
 //!
-//! A number of laser cycles is not advised. Half of such surfaces are seen beside others or through the end of their window, and the photons of their
-//! echoes do not tell how many more they need. 4.5 and 8.2 times as many, reckoned from them, brought 16 % and 25 % a depth, not half.
+//! A number of laser cycles is not advised, because the photons of echoes do not tell it: 4.5 and 8.2 times as many, reckoned from them, brought 16 % and
+//! 25 % of such surfaces a depth, not half.
 
 use super::pixel::NoDepth;
 use super::remark::{Circumstances, signal_in_window};
@@ -124,7 +124,7 @@ mod tests {
         );
     }
 
-    /// The wall at the end of a hall whose light does not reach it.
+    /// Beyond the reach every seventh surface still has a depth.
     #[test]
     fn the_reach_parts_surfaces_with_and_without_a_depth() {
         let near_and_far = |range_m: f64, has_depth| super::SeenSurface {

@@ -107,9 +107,8 @@ impl Scene {
         faults.extend(check_rig(&scene.rig));
         faults.extend(check_wavelengths(&scene));
         for fault in &mut faults {
-            if let Some(section) = other_section(&fault.path).filter(|_| is_of_unknown_key(fault)) {
-                let key = fault.path.rsplit('.').next().unwrap_or_default();
-                fault.message = format!("unknown key `{key}`; did you mean {section}?");
+            if let Some((key, meant)) = key_of_other_section(&fault.path) {
+                fault.message = format!("unknown key `{key}`; did you mean {meant}?");
             }
             fault.message = place(document, &fault.path) + &fault.message;
         }
@@ -164,22 +163,30 @@ impl Scene {
     }
 }
 
-/// Whether nothing better than a list of names is known of an unknown key.
-fn is_of_unknown_key(fault: &Fault) -> bool {
-    fault.message.starts_with("unknown key `") && !fault.message.contains("did you mean")
-}
-
-/// The key of another section whose name is that of an unknown key at `path`, or the nearest to it.
-fn other_section(path: &str) -> Option<String> {
-    let (section, key) = (path.split('.').next()?, path.rsplit('.').next()?);
-    let others = Scene::SECTIONS.iter().filter(|other| other.name != section);
-    let keys = others.flat_map(|other| other.keys.iter().map(move |key| (other.name, key.name)));
-    let meant = nearest(key, keys.clone().map(|(_, key)| key))?;
-    let (section, key) = keys.clone().find(|(_, key)| *key == meant)?;
-    Some(match section {
-        "object" | "interferer" => format!("`{key}` of an [[{section}]]"),
-        _ => format!("`{key}` of [{section}]"),
-    })
+/// The key at `path`, if its section has none of a name like that, and the key of another section that has.
+fn key_of_other_section(path: &str) -> Option<(&str, String)> {
+    let (section, rest) = path.split_once('.')?;
+    let key = rest.rsplit('.').next()?;
+    let (own, others): (Vec<&Section>, Vec<&Section>) =
+        (Scene::SECTIONS.iter()).partition(|other| other.name == section);
+    let names = |section: &'static Section| section.keys.iter().map(|key| key.name);
+    let has_own = |own: &&'static Section| {
+        names(own).any(|name| name == key) || nearest(key, names(own)).is_some()
+    };
+    if own.is_empty() || own.iter().any(has_own) {
+        return None;
+    }
+    let meant = nearest(key, others.iter().flat_map(|section| names(section)))?;
+    let section = others
+        .iter()
+        .find(|section| names(section).any(|name| name == meant))?;
+    Some((
+        key,
+        match section.name {
+            list @ ("object" | "interferer") => format!("`{meant}` of an [[{list}]]"),
+            name => format!("`{meant}` of [{name}]"),
+        },
+    ))
 }
 
 /// What to do about the name of a section that is none.

@@ -51,7 +51,7 @@ prop_compose! {
     }
 }
 
-/// A limit that some CLK edge meets, to so many femtoseconds.
+/// A CLK edge, by its number, that comes at a limit, and how far beside it, fs.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Meet {
     /// The strobe that it counts towards, and the next laser cycle's reset.
