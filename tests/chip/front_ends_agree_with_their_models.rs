@@ -5,7 +5,7 @@ use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{
-    ChipTiming, Exposure, FrontEnd, Sensor, SensorConfig, WindowLaw, front_end, macropixel,
+    ChipTiming, Exposure, FrontEnd, Sensor, SensorConfig, WindowLaw, front_end, macropixel_model,
 };
 use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, LitPixel, Replay, Window,
@@ -139,7 +139,7 @@ proptest! {
         let events: Vec<SpadEvent> = pulses.iter().map(|&(time, spad)| SpadEvent { time, spad }).collect();
         let sensor = Sensor::from(&config);
         let delays = (timing, &**sensor.local_stop_delays());
-        let by_model = macropixel::MacropixelModel::new(&config, delays, &exposure).histogram(start, pulses);
+        let by_model = macropixel_model::MacropixelModel::new(&config, delays, &exposure).histogram(start, pulses);
         let by_gates = Gate::new(&config, &exposure).histogram(start, &events);
         prop_assert_eq!(by_gates.as_ref(), Ok(&by_model));
         let refused = Window::new(&config, &exposure).histogram(start, &events);

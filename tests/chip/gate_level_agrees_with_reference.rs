@@ -1,7 +1,7 @@
 //! The netlist, the reference models and the window law agree: same LOCAL_STOP times to the femtosecond,
 //! same histograms to the count, over random sensors, clocks, STOP phases, start values and photon times.
 
-use guided_dtof::chip::macropixel::MacropixelModel;
+use guided_dtof::chip::macropixel_model::MacropixelModel;
 use guided_dtof::chip::p_counter::starts_high;
 use guided_dtof::chip::window_law::{WindowLaw, WindowOutcome as LawWindow};
 use guided_dtof::chip::{

@@ -2,7 +2,7 @@
 //! where it differs from the shift register and from delay lines; and which engines leave it out, by name.
 
 use guided_dtof::analysis::TimingVerdict;
-use guided_dtof::chip::macropixel::MacropixelModel;
+use guided_dtof::chip::macropixel_model::MacropixelModel;
 use guided_dtof::chip::race::Irregular;
 use guided_dtof::chip::{
     AfterBorrow, Exposure, Overflow, PCounter, Sensor, SensorConfig, Silicon, Tap, Tdc, WindowLaw,

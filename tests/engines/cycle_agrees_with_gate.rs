@@ -6,7 +6,7 @@
 use crate::scenario;
 
 use crate::cases::cases;
-use guided_dtof::chip::macropixel::MacropixelModel;
+use guided_dtof::chip::macropixel_model::MacropixelModel;
 use guided_dtof::chip::window_law::{WindowLaw, WindowOutcome};
 use guided_dtof::chip::{EventType, Exposure, Mode, PCounter, Sensor, SensorConfig};
 use guided_dtof::engine::{Cycle, Gate, Histograms, Replay};

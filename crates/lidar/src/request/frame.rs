@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{Spelling, guided_exposure};
+use super::spelling::Spelling;
+use super::wording::guided_exposure;
 use crate::chip::{Sensor, SensorConfig, Tdc};
 use crate::engine::CohortOptions;
 use crate::files::{InputError, parse_json, read_text};

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use super::FrameRequest;
+use super::frame::FrameRequest;
 use crate::analysis::VerdictReport;
 use crate::chip::{Mode, SensorConfig, WindowLaw, library_files};
 use crate::engine::variance_left_out;

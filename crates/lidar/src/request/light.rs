@@ -7,7 +7,8 @@
 //! ```
 
 use super::frame::as_warm_as;
-use super::{Spelling, exposure, of_engine};
+use super::spelling::Spelling;
+use super::wording::{exposure, of_engine};
 use crate::chip::Sensor;
 use crate::files::InputError;
 use crate::photons::{LightSource, LightSourceError, LitExposure};

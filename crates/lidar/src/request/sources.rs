@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::Spelling;
+use super::spelling::Spelling;
 use crate::chip::own_block::replaceable;
 use crate::chip::sensors::CHIPS;
 use crate::chip::{Sensor, SensorConfig};

@@ -1,6 +1,6 @@
 //! What users read of an error: what the library says, and the cure in the settings that they gave.
 
-use super::Spelling;
+use super::spelling::Spelling;
 use crate::chip::Irregular;
 use crate::chip::race::{Cure, NoAim};
 use crate::chip::{Exposure, ExposureError, Sensor, SensorConfig, WindowLaw};

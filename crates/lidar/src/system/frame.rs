@@ -11,24 +11,25 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use self::at_gates::AtGates;
+use super::circumstances::Circumstances;
 use super::error::FrameError;
 use super::light::{light_in, lit_pixels, photon_stream, starts_of, truth_in};
+use super::load::load_starts;
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{PixelContext, Ranger};
-use super::remark::{Circumstances, DepthHint};
+use super::remark::DepthHint;
 use super::result::{Frame, PhaseTimes};
 use super::settings::{EngineKind, FrameSettings, GateProbe};
 use super::shared::{SharedView, SharedWork};
 use super::stopwatch::{Stopwatch, timed};
 use super::tolerance::{Tolerance, ToleranceResult};
-use crate::chip::{Exposure, SensorConfig};
+use crate::chip::Exposure;
 use crate::engine::{
     Answer, Cohort, EngineError, ExposureResult, LitPixel, PulsedPixel, Replay, Window, expose,
     expose_without_skipping, load,
 };
 use crate::guide::{GuideInput, GuideMap};
-use crate::netlist::Netlist;
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use crate::scene::GroundTruth;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
@@ -448,29 +449,6 @@ pub(super) fn check_not_stopped(answer: impl Answer) -> Result<(), EngineError> 
         Err(EngineError::Stopped)
     } else {
         Ok(())
-    }
-}
-
-/// Sends start values through the serial pin of the load path, at gate level.
-///
-/// # Errors
-/// Another start value in the array than was sent.
-pub(super) fn load_starts(
-    sensor: &SensorConfig,
-    load_netlist: &Netlist,
-    starts: &[u16],
-) -> Result<load::Load, FrameError> {
-    let load = load::load(sensor, load_netlist, starts, &mut ());
-    let mut arrived = starts.iter().zip(&load.starts).enumerate();
-    let wrong = arrived.find(|(_, (sent, found))| **found != Some(**sent));
-    match wrong {
-        None => Ok(load),
-        Some((pixel, (&sent, &found))) => Err(FrameError::Load {
-            row: pixel / sensor.cols,
-            col: pixel % sensor.cols,
-            sent,
-            found,
-        }),
     }
 }
 

@@ -3,8 +3,8 @@
 //! A number of laser cycles is not advised, because the photons of echoes do not tell it: 4.5 and 8.2 times as many, reckoned from them, brought 16 % and
 //! 25 % of such surfaces a depth, not half.
 
+use super::circumstances::{Circumstances, signal_in_window};
 use super::pixel::NoDepth;
-use super::remark::{Circumstances, signal_in_window};
 use crate::chip::WindowLaw;
 use crate::ranging::Response;
 

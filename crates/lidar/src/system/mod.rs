@@ -2,12 +2,14 @@
 
 mod aim;
 mod calibrate;
+mod circumstances;
 mod depth_scale;
 mod distance;
 mod drive;
 mod error;
 mod frame;
 mod light;
+mod load;
 mod lost_peaks;
 mod no_depth_pattern;
 pub mod pareto;

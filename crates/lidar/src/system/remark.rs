@@ -3,13 +3,12 @@
 
 use serde::Serialize;
 
+use super::circumstances::{Circumstances, signal_in_window};
 use super::lost_peaks::LostPeaks;
 use super::pixel::{NoDepth, PixelDepth};
-use crate::chip::{EventType, Exposure, Mode, Sensor, SensorConfig, WindowLaw};
-use crate::guide::Guide;
+use crate::chip::{EventType, Mode, SensorConfig, WindowLaw};
 use crate::photon::PixelLight;
 use crate::ranging::{EchoLight, Response};
-use crate::scene::Scene;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// Share of laser cycles in which background alone counts in a bin, from which on less of it is advised instead of more light: chosen.
@@ -27,24 +26,6 @@ pub struct DepthHint {
     pub surfaces: usize,
     /// How many they are, why, and what to change.
     pub sentence: String,
-}
-
-/// A frame's circumstances.
-pub(super) struct Circumstances<'a> {
-    /// The chip.
-    pub sensor: &'a Sensor,
-    /// Its clocks.
-    pub exposure: &'a Exposure,
-    /// Length of a bin, s.
-    pub bin_s: f64,
-    /// The world.
-    pub scene: &'a Scene,
-    /// What the windows were put by.
-    pub guide: &'a dyn Guide,
-    /// The light on every macropixel.
-    pub light: &'a [PixelLight],
-    /// What became of every macropixel.
-    pub pixels: &'a [PixelDepth],
 }
 
 impl Circumstances<'_> {
@@ -293,18 +274,6 @@ impl Circumstances<'_> {
     }
 }
 
-/// Photons of echoes that arrive in a laser cycle within a macropixel's window, or all where it has none.
-pub(super) fn signal_in_window(law: &WindowLaw, pixel: &PixelDepth, light: &PixelLight) -> f64 {
-    let window = pixel.start.and_then(|start| law.window(start).open());
-    let seen = window.map(|window| law.interval(&window));
-    let is_seen = |time: Time| seen.as_ref().is_none_or(|seen| seen.contains(&time));
-    let of_segments = light.segments().map(|segment| {
-        let echoes = segment.echoes().filter(|echo| is_seen(echo.arrival));
-        echoes.map(|echo| echo.photons).sum()
-    });
-    of_segments.fold(0.0, f64::max)
-}
-
 /// "from 3.0 m to 7.0 m" of the least and the greatest.
 fn span(metres: &[f64]) -> String {
     let least = metres.iter().copied().fold(f64::INFINITY, f64::min);
@@ -315,8 +284,8 @@ fn span(metres: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chip::SensorConfig;
-    use crate::scene::{DVec3, Ray};
+    use crate::chip::{Exposure, SensorConfig};
+    use crate::scene::{DVec3, Ray, Scene};
     use crate::system::{Frame, FrameSettings, take_frame};
 
     /// A small frame of the street.

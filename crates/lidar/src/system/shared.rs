@@ -14,8 +14,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::error::FrameError;
-use super::frame::load_starts;
 use super::light::{light_in, truth_in};
+use super::load::load_starts;
 use super::policy::{Pointing, WindowPolicy};
 use super::settings::FrameSettings;
 use crate::chip::{Exposure, Sensor};

@@ -50,6 +50,7 @@ mod draw;
 mod exposure;
 mod foreign;
 mod group;
+mod laser_cycles;
 mod limits;
 mod listed;
 mod numbers;

@@ -31,8 +31,9 @@ pub mod window_law;
 pub use crate::photon::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use bin_edges::BinEdges;
 pub use blocks::{
-    array, correlation, front_end, histogram, histogram_sums, load_path, macropixel, metdc,
-    metdc_counter, metdc_delay_line, p_counter, p_counter_timing, photon_line, readout, tdc,
+    array, correlation, front_end, histogram, histogram_sums, load_path, macropixel,
+    macropixel_model, metdc, metdc_counter, metdc_delay_line, p_counter, p_counter_timing,
+    photon_line, readout, tdc,
 };
 pub use config::{
     AfterBorrow, EventType, FrontEnd, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,

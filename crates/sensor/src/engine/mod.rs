@@ -10,7 +10,7 @@
 //!
 //! All but `Cohort` take the same start value and SPAD pulses ([`Replay`]) and, with the same delays, give the same histogram. `Cycle` and `Window` assume what
 //! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
-//! plain-Rust reference model ([`crate::chip::macropixel::MacropixelModel`]) is the tests' slow judge of all of them. `Window`
+//! plain-Rust reference model ([`crate::chip::macropixel_model::MacropixelModel`]) is the tests' slow judge of all of them. `Window`
 //! also refuses a P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
 mod cancelling;

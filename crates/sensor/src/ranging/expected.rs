@@ -14,6 +14,7 @@
 //!
 //! Assumed: SPADs alike ([`dead_times`](super::dead_times) says what it costs where they are not), and recovered from the echo before the next laser cycle's.
 
+mod known_chances;
 mod other_bins;
 
 use std::sync::Arc;
@@ -21,7 +22,6 @@ use std::sync::Arc;
 use smallvec::smallvec;
 
 use super::counting::Counting;
-use super::known_chances;
 use super::plain::{self, LANES, OfBins};
 use super::pulse::{PULSE_REACH, Pulse, Tail};
 use super::spad_state::{Dead, Spad};

@@ -7,7 +7,6 @@ mod dead_times;
 mod detector;
 mod expected;
 mod finder;
-mod known_chances;
 mod likelihood;
 mod peak;
 mod place;

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
+use crate::chip::SensorConfig;
 use crate::scene::Scene;
 use crate::system::range_counts;
 

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
 use super::group::CycleGroup;
+use super::laser_cycles::LaserCycles;
 use super::schedule::Schedule;
 use super::slot::Slots;
 use crate::photon::light::{OtherLaser, PixelLight};
@@ -11,7 +12,7 @@ use crate::photon::pulse::{PulseSampler, PulseShape};
 use crate::photon::quantile::NormalSampler;
 use crate::photon::random::philox_key;
 use crate::photon::spad::SpadModel;
-use crate::units::{Every, Frequency, Time};
+use crate::units::{Frequency, Time};
 
 /// Farther away than any photon comes in its cycle, fs.
 pub(super) const FAR_FS: i64 = 1 << 60;
@@ -33,7 +34,7 @@ type KnownLaser = (OtherLaser, Arc<Schedule>);
 pub struct PhotonStream {
     pub(super) config: StreamConfig,
     pub(super) key: [u32; 2],
-    starts: Every,
+    laser_cycles: LaserCycles,
     /// The whole femtoseconds of a laser cycle.
     pub cycle_fs: i64,
     /// Slots of a laser cycle.
@@ -48,10 +49,15 @@ impl PhotonStream {
     /// Prepares the stream.
     pub fn new(config: &StreamConfig) -> Self {
         debug_assert!(config.stop_periods > 0, "a cycle needs a length");
+        let whole_fs = config.clock.whole_fs(i64::from(config.stop_periods));
         PhotonStream {
             key: philox_key(config.seed),
-            starts: config.clock.every(config.stop_periods),
-            cycle_fs: config.clock.whole_fs(i64::from(config.stop_periods)),
+            laser_cycles: LaserCycles {
+                number: config.laser_cycles,
+                whole_fs,
+                starts: config.clock.every(config.stop_periods),
+            },
+            cycle_fs: whole_fs,
             slots: Slots::new(config.clock, config.stop_periods, config.lead),
             gaussian: NormalSampler::new(config.pulse_sigma.as_fs() as f64),
             shape: config.pulse_shape.as_ref().map(sampler),
@@ -66,7 +72,7 @@ impl PhotonStream {
         if let Some((_, schedule)) = known.iter().find(|(other, _)| other == laser) {
             return Arc::clone(schedule);
         }
-        let schedule = Arc::new(Schedule::new(laser, self));
+        let schedule = Arc::new(Schedule::new(laser, self.config.seed, self.laser_cycles));
         known.push((*laser, Arc::clone(&schedule)));
         schedule
     }
@@ -90,7 +96,7 @@ impl PhotonStream {
     /// Start of laser cycle `cycle`, exact to the femtosecond.
     #[inline]
     pub fn cycle_start(&self, cycle: u32) -> Time {
-        self.starts.time(cycle)
+        self.laser_cycles.start(cycle)
     }
 
     /// When the photons of a cycle begin and end, fs after its start.

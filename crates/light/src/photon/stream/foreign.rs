@@ -64,7 +64,7 @@ impl PhotonStream {
                 let from_fs = within_fs.start + moved_fs - reach_fs;
                 let until_fs = (within_fs.end + moved_fs + reach_fs).min(self.cycle_fs + 2);
                 if from_fs < until_fs {
-                    let pulses = schedule.arriving_within(self, from_fs.max(0)..until_fs, delay_fs);
+                    let pulses = schedule.arriving_within(from_fs.max(0)..until_fs, delay_fs);
                     seen.extend(pulses);
                 }
             }
@@ -72,7 +72,7 @@ impl PhotonStream {
             seen.dedup();
             let arrivals = seen
                 .into_iter()
-                .filter_map(|pulse| schedule.arrival(self, pulse, delay_fs));
+                .filter_map(|pulse| schedule.arrival(pulse, delay_fs));
             arrivals
                 .map(|(cycle, at_fs)| (cycle, Time::from_fs(at_fs)))
                 .collect()

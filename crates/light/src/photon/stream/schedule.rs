@@ -11,7 +11,7 @@
 
 use std::ops::Range;
 
-use super::exposure::PhotonStream;
+use super::laser_cycles::LaserCycles;
 use crate::photon::light::OtherLaser;
 use crate::photon::random::{RandomPurpose, random_stream};
 
@@ -21,6 +21,8 @@ const LONGEST_DELAY_S: f64 = 50e-6;
 /// The pulses of one laser in one exposure.
 #[derive(Debug)]
 pub(super) struct Schedule {
+    /// Own laser cycles of the exposure.
+    cycles: LaserCycles,
     /// When each is sent, waits included, rising; fs after the exposure begins.
     sent_fs: Vec<i64>,
     /// How long all waits before each laser cycle have been; empty without dither.
@@ -31,9 +33,8 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    /// That of `laser` beside the laser cycles of `stream`.
-    pub(super) fn new(laser: &OtherLaser, stream: &PhotonStream) -> Self {
-        let (seed, cycles) = (stream.config.seed, stream.config.laser_cycles);
+    /// That of `laser` beside the laser cycles of an exposure with this seed.
+    pub(super) fn new(laser: &OtherLaser, seed: u64, cycles: LaserCycles) -> Self {
         let words =
             |number: u32, what: u32| random_stream(seed, RandomPurpose::OtherLaser, number, what);
         let unit = |word: u32| rand_philox::u32_to_unit_f64(word);
@@ -42,13 +43,13 @@ impl Schedule {
         if longest_wait_fs > 0 {
             // One wait before each laser cycle, whichever laser it meets.
             let (mut random, mut all_fs) = (words(u32::MAX, 0), 0);
-            waited_fs.extend((0..cycles).map(|_| {
+            waited_fs.extend((0..cycles.number).map(|_| {
                 all_fs += (unit(random.next_u32()) * longest_wait_fs as f64) as i64;
                 all_fs
             }));
         }
         let waited = waited_fs.last().copied().unwrap_or(0);
-        let end_s = (stream.cycle_start(cycles).as_fs() + waited) as f64 * 1e-15;
+        let end_s = (cycles.start(cycles.number).as_fs() + waited) as f64 * 1e-15;
         let phase = laser
             .phase
             .unwrap_or_else(|| unit(words(laser.number, 0).next_u32()));
@@ -66,14 +67,15 @@ impl Schedule {
         let mut sent_fs: Vec<i64> = sent.collect();
         sent_fs.sort_unstable();
         let mut schedule = Schedule {
+            cycles,
             sent_fs,
             waited_fs,
             longest_wait_fs,
             by_offset: Vec::new(),
         };
         let offset = |(pulse, &sent_fs): (u32, &i64)| {
-            let cycle = schedule.cycle_at(stream, sent_fs);
-            (sent_fs - schedule.start_fs(stream, cycle), pulse)
+            let cycle = schedule.cycle_at(sent_fs);
+            (sent_fs - schedule.start_fs(cycle), pulse)
         };
         let mut by_offset: Vec<_> = (0..).zip(&schedule.sent_fs).map(offset).collect();
         by_offset.sort_unstable();
@@ -82,17 +84,17 @@ impl Schedule {
     }
 
     /// When a laser cycle begins, waits included.
-    fn start_fs(&self, stream: &PhotonStream, cycle: u32) -> i64 {
+    fn start_fs(&self, cycle: u32) -> i64 {
         let waited_fs = self.waited_fs.get(cycle as usize).or(self.waited_fs.last());
-        stream.cycle_start(cycle).as_fs() + waited_fs.copied().unwrap_or(0)
+        self.cycles.start(cycle).as_fs() + waited_fs.copied().unwrap_or(0)
     }
 
     /// The last laser cycle of the exposure that has begun by a time; the first one if none has.
-    fn cycle_at(&self, stream: &PhotonStream, time_fs: i64) -> u32 {
-        let (mut begun, mut not_begun) = (0, stream.config.laser_cycles.max(1));
+    fn cycle_at(&self, time_fs: i64) -> u32 {
+        let (mut begun, mut not_begun) = (0, self.cycles.number.max(1));
         while not_begun - begun > 1 {
             let middle = begun + (not_begun - begun) / 2;
-            if self.start_fs(stream, middle) <= time_fs {
+            if self.start_fs(middle) <= time_fs {
                 begun = middle
             } else {
                 not_begun = middle
@@ -102,16 +104,11 @@ impl Schedule {
     }
 
     /// The laser cycle in which a pulse arrives, and when after its start, fs; `None` before and after the exposure and in a wait.
-    pub(super) fn arrival(
-        &self,
-        stream: &PhotonStream,
-        pulse: u32,
-        delay_fs: i64,
-    ) -> Option<(u32, i64)> {
+    pub(super) fn arrival(&self, pulse: u32, delay_fs: i64) -> Option<(u32, i64)> {
         let time_fs = self.sent_fs[pulse as usize] + delay_fs;
-        let cycle = self.cycle_at(stream, time_fs);
-        let since_fs = time_fs - self.start_fs(stream, cycle);
-        let length_fs = (stream.cycle_start(cycle + 1) - stream.cycle_start(cycle)).as_fs();
+        let cycle = self.cycle_at(time_fs);
+        let since_fs = time_fs - self.start_fs(cycle);
+        let length_fs = (self.cycles.start(cycle + 1) - self.cycles.start(cycle)).as_fs();
         (0..length_fs)
             .contains(&since_fs)
             .then_some((cycle, since_fs))
@@ -120,11 +117,10 @@ impl Schedule {
     /// Pulses that may arrive between two times after the start of a laser cycle, of any laser cycle; some perhaps twice.
     pub(super) fn arriving_within(
         &self,
-        stream: &PhotonStream,
         within_fs: Range<i64>,
         delay_fs: i64,
     ) -> impl Iterator<Item = u32> {
-        let cycle_fs = stream.cycle_fs;
+        let cycle_fs = self.cycles.whole_fs;
         // A pulse may be sent some laser cycles, and as many waits, before the one in which it arrives.
         let most = delay_fs.div_euclid(cycle_fs) + 1;
         (0..=most).flat_map(move |before| {
@@ -141,14 +137,13 @@ impl Schedule {
     /// Pulses that may arrive in some laser cycles, or `reach_fs` before or after them.
     pub(super) fn arriving_in(
         &self,
-        stream: &PhotonStream,
         cycles: Range<u32>,
         delay_fs: i64,
         reach_fs: i64,
     ) -> Range<u32> {
-        let last = cycles.end.min(stream.config.laser_cycles);
-        let from_fs = self.start_fs(stream, cycles.start) - reach_fs - delay_fs;
-        let until_fs = self.start_fs(stream, last) + reach_fs - delay_fs;
+        let last = cycles.end.min(self.cycles.number);
+        let from_fs = self.start_fs(cycles.start) - reach_fs - delay_fs;
+        let until_fs = self.start_fs(last) + reach_fs - delay_fs;
         let before =
             |time_fs: i64| self.sent_fs.partition_point(|&sent_fs| sent_fs < time_fs) as u32;
         before(from_fs)..before(until_fs + 1)

@@ -46,10 +46,10 @@ impl PixelStream<'_> {
         let first = group.first_cycle();
         let cycles = first..first.saturating_add(group.cycles());
         let (schedule, delay_fs) = (&foreign.schedule, foreign.delay_fs);
-        let of_group = schedule.arriving_in(stream, cycles.clone(), delay_fs, reach_fs);
+        let of_group = schedule.arriving_in(cycles.clone(), delay_fs, reach_fs);
         let arriving = wraps.flat_map(|moved_fs| {
             let moved_fs = (within_fs.start + moved_fs).max(0)..within_fs.end + moved_fs;
-            schedule.arriving_within(stream, moved_fs, delay_fs)
+            schedule.arriving_within(moved_fs, delay_fs)
         });
         let mut pulses: Vec<u32> = arriving.filter(|pulse| of_group.contains(pulse)).collect();
         pulses.sort_unstable();
@@ -74,10 +74,8 @@ impl PixelStream<'_> {
         mut each: impl FnMut(Stray),
     ) {
         let reach_fs = self.gaussian.reach().ceil() as i64;
-        let (stream, delay_fs) = (self.stream, foreign.delay_fs);
-        let pulses = foreign
-            .schedule
-            .arriving_in(stream, cycles.clone(), delay_fs, reach_fs);
+        let schedule = &foreign.schedule;
+        let pulses = schedule.arriving_in(cycles.clone(), foreign.delay_fs, reach_fs);
         for pulse in pulses {
             self.each_stray(foreign, pulse, cycles.clone(), &mut each);
         }
@@ -92,7 +90,7 @@ impl PixelStream<'_> {
         mut each: impl FnMut(Stray),
     ) {
         let stream = self.stream;
-        let arrival = foreign.schedule.arrival(stream, pulse, foreign.delay_fs);
+        let arrival = foreign.schedule.arrival(pulse, foreign.delay_fs);
         let Some((of_pulse, since_fs)) = arrival else {
             return;
         };

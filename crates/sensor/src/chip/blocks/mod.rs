@@ -31,6 +31,7 @@ pub mod histogram;
 pub mod histogram_sums;
 pub mod load_path;
 pub mod macropixel;
+pub mod macropixel_model;
 pub mod metdc;
 pub mod metdc_counter;
 pub mod metdc_delay_line;

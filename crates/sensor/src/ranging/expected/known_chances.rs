@@ -9,9 +9,9 @@
 
 use std::cell::RefCell;
 
-use super::expected::{EchoLight, Response};
-use super::plain::OfBins;
+use super::{EchoLight, Response};
 use crate::numerics::Dual;
+use crate::ranging::plain::OfBins;
 
 /// Lights that a thread keeps: as many as the two fits with a width look at before the light is asked for that they began with.
 const MOST_KEPT: usize = 16;
