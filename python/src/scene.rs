@@ -14,7 +14,7 @@ use crate::arrays::map;
 use crate::background::run;
 use crate::failure::Failure;
 use crate::values::{
-    assignments, hash_of, html_of, item, reassigned, table_to_python, to_table, value_at,
+    assignments, hash_of, html_of, item, reassigned, table_to_python, to_table, value_at, warn_of,
 };
 
 /// A scene: one that is built in, a file, and single keys of it.
@@ -52,56 +52,56 @@ impl Scene {
     fn table(&self) -> Table {
         Table::try_from(&self.world).expect("a scene is numbers and texts")
     }
+
+    /// A scene as its user gave it, who is told of odd values.
+    fn given(py: Python<'_>, world: World, name: String) -> PyResult<Self> {
+        warn_of(py, &name, &world.remarks())?;
+        Ok(Scene { world, name })
+    }
 }
 
 #[pymethods]
 impl Scene {
     #[new]
     #[pyo3(signature = (source=None, keys=None, /))]
-    fn new(source: Option<PathBuf>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        source: Option<PathBuf>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
         let sources = Sources {
             scene: source,
             set: assignments("scene.", keys)?,
             ..Sources::default()
         };
         let (_, world) = sources.read().map_err(Failure::from)?;
-        Ok(Scene {
-            world,
-            name: sources.scene_name(),
-        })
+        Self::given(py, world, sources.scene_name())
     }
 
     /// A scene from the text of a scene file (TOML); files that it names are relative to the current folder.
     #[staticmethod]
     #[pyo3(signature = (text, name="scene"))]
-    fn from_toml(text: &str, name: &str) -> PyResult<Self> {
+    fn from_toml(py: Python<'_>, text: &str, name: &str) -> PyResult<Self> {
         let world = World::parse(name, text).map_err(Failure::from)?;
-        Ok(Scene {
-            world,
-            name: name.to_owned(),
-        })
+        Self::given(py, world, name.to_owned())
     }
 
     /// A scene from a dict of sections, as `to_dict` gives it; keys that it leaves out have the defaults of a scene file, and files that it
     /// names are relative to the current folder.
     #[staticmethod]
     #[pyo3(signature = (sections, name="scene"))]
-    fn from_dict(sections: &Bound<'_, PyDict>, name: &str) -> PyResult<Self> {
+    fn from_dict(py: Python<'_>, sections: &Bound<'_, PyDict>, name: &str) -> PyResult<Self> {
         let document = Document::from_table(name, to_table(sections)?);
-        Ok(Scene {
-            world: World::read(&document).map_err(Failure::from)?,
-            name: name.to_owned(),
-        })
+        let world = World::read(&document).map_err(Failure::from)?;
+        Self::given(py, world, name.to_owned())
     }
 
     /// The same scene with other keys.
     #[pyo3(signature = (keys, /))]
-    fn with_(&self, keys: &Bound<'_, PyDict>) -> PyResult<Self> {
+    fn with_(&self, py: Python<'_>, keys: &Bound<'_, PyDict>) -> PyResult<Self> {
         let document = reassigned(&self.name, self.table(), Some(keys))?;
-        Ok(Scene {
-            world: World::read(&document).map_err(Failure::from)?,
-            name: self.name.clone(),
-        })
+        let world = World::read(&document).map_err(Failure::from)?;
+        Self::given(py, world, self.name.clone())
     }
 
     /// All keys and their values, section by section; `from_dict` reads it.

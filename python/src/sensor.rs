@@ -12,7 +12,7 @@ use toml::{Table, Value};
 
 use crate::failure::Failure;
 use crate::values::{
-    assignments, hash_of, html_of, item, reassigned, table_to_python, to_python, to_table,
+    assignments, hash_of, html_of, item, reassigned, table_to_python, to_python, to_table, warn_of,
 };
 
 /// A sensor: a chip by name, a file, or keys.
@@ -39,46 +39,53 @@ impl Sensor {
     fn table(&self) -> Table {
         Table::try_from(&*self.chip).expect("numbers and words")
     }
+
+    /// A sensor as its user gave it, who is told of odd values.
+    fn given(py: Python<'_>, chip: impl Into<Chip>) -> PyResult<Self> {
+        let chip = chip.into();
+        warn_of(py, "the sensor", &chip.remarks())?;
+        Ok(Sensor { chip })
+    }
 }
 
 #[pymethods]
 impl Sensor {
     #[new]
     #[pyo3(signature = (source=None, /, **keys))]
-    fn new(source: Option<PathBuf>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        source: Option<PathBuf>,
+        keys: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
         let sources = Sources {
             sensor: source,
             set: assignments("sensor.", keys)?,
             ..Sources::default()
         };
-        let chip = sources.read_sensor().map_err(Failure::from)?;
-        Ok(Sensor { chip })
+        Self::given(py, sources.read_sensor().map_err(Failure::from)?)
     }
 
     /// A sensor from the text of a sensor file (TOML); keys that it leaves out are the QuantIC4x4's.
     #[staticmethod]
-    fn from_toml(text: &str) -> PyResult<Self> {
+    fn from_toml(py: Python<'_>, text: &str) -> PyResult<Self> {
         let config = SensorConfig::parse("sensor", text).map_err(Failure::from)?;
-        let chip = config.into();
-        Ok(Sensor { chip })
+        Self::given(py, config)
     }
 
     /// A sensor from a dict, as `to_dict` gives it; keys that it leaves out are the QuantIC4x4's.
     #[staticmethod]
-    fn from_dict(keys: &Bound<'_, PyDict>) -> PyResult<Self> {
+    fn from_dict(py: Python<'_>, keys: &Bound<'_, PyDict>) -> PyResult<Self> {
         let document = reassigned("sensor", to_table(keys)?, None)?;
         let config = SensorConfig::read_document(&document).map_err(Failure::from)?;
-        let chip = config.into();
-        Ok(Sensor { chip })
+        Self::given(py, config)
     }
 
     /// The same sensor with other keys.
     #[pyo3(signature = (**keys))]
-    fn with_(&self, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn with_(&self, py: Python<'_>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let document = reassigned("the sensor", self.table(), keys)?;
         let config = SensorConfig::read_document(&document).map_err(Failure::from)?;
-        let chip = config.into();
-        Ok(Sensor { chip })
+        Self::given(py, config)
     }
 
     /// All keys and their values; `from_dict` reads it.

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 
 use crate::background::run;
 use crate::failure::Failure;
-use crate::values::{by_json, to_text};
+use crate::values::{by_json, to_text, warn_of};
 
 impl From<SweepError> for Failure {
     fn from(error: SweepError) -> Self {
@@ -46,10 +46,12 @@ pub(crate) fn sweep_text(study: &Bound<'_, PyDict>) -> PyResult<String> {
 /// Points of a study, its folder for results and its name.
 #[pyfunction]
 pub(crate) fn sweep_outline(
+    py: Python<'_>,
     study: PathBuf,
     text: Option<&str>,
 ) -> PyResult<(u64, PathBuf, String)> {
     let study = read(&study, text).map_err(Failure::from)?;
+    warn_of(py, "the study", &study.remarks())?;
     Ok((study.len(), study.out.clone(), study.name))
 }
 

@@ -1,11 +1,12 @@
 //! Values of settings between Python and TOML.
 
+use std::ffi::CString;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use guided_dtof::files::in_plain_words;
-use guided_dtof::settings::Document;
+use guided_dtof::settings::{Document, said_remarks};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::{PyKeyError, PyTypeError};
+use pyo3::exceptions::{PyKeyError, PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use serde::Serialize;
@@ -211,6 +212,19 @@ pub(crate) fn reassigned(
             .map_err(Failure::from)?;
     }
     Ok(document)
+}
+
+/// Warns of values that are probably in another unit than their key has.
+///
+/// # Errors
+/// When warnings are errors.
+pub(crate) fn warn_of(py: Python<'_>, source: &str, remarks: &[String]) -> PyResult<()> {
+    let category = py.get_type::<PyUserWarning>();
+    for said in said_remarks(source, remarks) {
+        let said = CString::new(said).expect("a name of a file has no zero in it");
+        PyErr::warn(py, &category, &said, 1)?;
+    }
+    Ok(())
 }
 
 /// The value that was found under `key`, as `[]` gives it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,26 @@ def test_scenes_come_from_names_files_and_keys(tmp_path: Path) -> None:
     assert not np.array_equal(van.truth(32, 64), van.truth(32, 64, time_s=5.0), equal_nan=True)
     with pytest.raises(KeyError):
         street["lidar.pdee"]
+
+
+def test_a_value_in_another_unit_is_warned_of(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="the sensor: dead_time_ns = 8000 ns .* if you mean 8000 ps, give 8 ns"):
+        sensor = gdtof.Sensor(dead_time_ns=8000)
+    with pytest.warns(UserWarning, match="8000 ns"):
+        gdtof.Sensor.from_dict(sensor.to_dict())
+    with pytest.warns(UserWarning, match="built-in street: in .lidar., pulse_fwhm_ns = 5e-9 ns .* give 5 ns"):
+        scene = gdtof.Scene("street", {"lidar.pulse_fwhm_ns": 5e-9})
+    with pytest.warns(UserWarning, match="5e-9 ns"):
+        scene.with_({"lidar.pde": 0.1})
+    study = {"study": {"kind": "theory"}, "vary": {"sensor.dead_time_ns": [8, 8000]}}
+    with pytest.warns(UserWarning, match="the study: sensor.dead_time_ns = 8000 ns"):
+        gdtof.sweep(study, tmp_path / "results")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene.with_({"lidar.pulse_fwhm_ns": "5 ns"})
+        sensor.with_(dead_time_ns=8)
+        with pytest.raises(UserWarning, match="8000 ns"):
+            gdtof.Sensor(dead_time_ns=8000)
 
 
 @pytest.mark.parametrize("name", ["street", "warehouse", "van", "fog", "glass", "sweep", "night", "empty"])

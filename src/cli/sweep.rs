@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
+use super::settings::note_unusual;
 use super::voice::{note, notes, progress, quantity, say_unless_quiet};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
@@ -75,6 +76,7 @@ pub(super) fn run(args: &SweepArgs) -> anyhow::Result<()> {
 
 fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
     let study = Study::load(path)?;
+    note_unusual(path.display(), &study.remarks());
     let plots = plots(&args.results, &study)?;
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let folder = args

@@ -81,6 +81,24 @@ fn values_in_another_unit_are_told_with_that_unit() {
     );
 }
 
+/// Of a list and of a range, too.
+#[test]
+fn values_of_a_study_in_another_unit_are_told_with_that_unit() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let study = "[study]\nkind = \"theory\"\n[fixed]\nscene.lidar.pulse_fwhm_ns = 5e-9\n[vary]\nsensor.dead_time_ns = [8, 8000]\nscene.lidar.lens_diameter_mm = { from = 0.004, to = 4, steps = 2 }\n";
+    std::fs::write(here.join("s.toml"), study).unwrap();
+    let (_, error) = said(here, "sweep s.toml");
+    for says in [
+        "s.toml: scene.lidar.pulse_fwhm_ns = 5e-9 ns is far from the usual 0.01 to 500 ns; if you mean 5e-9 s, give 5 ns",
+        "s.toml: sensor.dead_time_ns = 8000 ns",
+        "s.toml: scene.lidar.lens_diameter_mm = 0.004 mm",
+    ] {
+        assert!(error.contains(says), "{error}");
+    }
+    assert_eq!(error.lines().count(), 3, "{error}");
+}
+
 #[test]
 fn times_of_a_detector_in_another_unit_are_told_with_that_unit() {
     let dir = tempfile::tempdir().unwrap();

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use toml::Value;
 
 use super::design::{self, SamplingDesign};
+use super::keys;
 use super::values::{Axis, Values, VariedKey};
 use crate::settings::words;
 
@@ -133,6 +134,19 @@ impl Study {
         }
         let seed = self.seed + replica;
         StudyPoint { values, seed }
+    }
+
+    /// A sentence for each key with a value that is far from what is usual ([`crate::settings::Key::remark`]).
+    pub fn remarks(&self) -> Vec<String> {
+        let fixed = self.fixed.iter();
+        let fixed = fixed.map(|(name, value)| (name, value.clone()));
+        let varied = self.varied().map(|key| (&key.name, key.values.all()));
+        let remark = |(name, value): (&String, Value)| {
+            let key = keys::find(self.kind, name).ok()?.key;
+            let of_name = name.strip_suffix(key.name).unwrap_or_default();
+            Some(format!("{of_name}{}", key.remark(&value)?))
+        };
+        fixed.chain(varied).filter_map(remark).collect()
     }
 
     /// Whether an axis is a range in equal ratios.

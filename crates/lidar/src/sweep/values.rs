@@ -55,6 +55,16 @@ pub(super) struct VariedKey {
     pub(super) column: Column,
 }
 
+impl Values {
+    /// The list, or the ends of the range.
+    pub(super) fn all(&self) -> Value {
+        match self {
+            Values::List(list) => Value::Array(list.clone()),
+            Values::Range(span) => Value::Array(vec![span.value(0.0), span.value(1.0)]),
+        }
+    }
+}
+
 impl VariedKey {
     /// How many values it has, where that is a number.
     pub(super) fn len(&self) -> Option<u64> {

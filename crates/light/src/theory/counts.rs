@@ -184,31 +184,23 @@ pub struct Tails {
 }
 
 impl Tails {
-    /// Tabulates `counts`. The points between two grid points are summed by recurrence from the
-    /// lower one, so no rounding travels further than one stride.
+    /// Tabulates `counts`. Few points between two grid points are summed by recurrence from the lower one, so no rounding travels further than
+    /// one stride; many are those of a smooth curve ([`between`]).
     pub(crate) fn new(counts: &Counts, first: u64, last: u64, stride: u64) -> Self {
         let grid = |i: usize| first + i as u64 * stride;
         let points = ((last - first).div_ceil(stride) + 1) as usize;
         let at: Vec<f64> = (0..points).map(|i| counts.probability(grid(i))).collect();
         let between: Vec<f64> = (0..points)
-            .map(|i| {
-                let mut term = at[i];
-                (grid(i)..grid(i) + stride - 1)
-                    .map(|k| {
-                        term *= counts.ratio(k);
-                        term
-                    })
-                    .sum()
-            })
+            .map(|i| between(counts, grid(i), stride))
             .collect();
         let mut below = vec![0.0; points];
-        below[0] = sum_outwards(at[0], (0..first).rev(), |k| 1.0 / counts.ratio(k));
+        below[0] = all_below(counts, first, stride);
         for i in 1..points {
             below[i] = below[i - 1] + at[i - 1] + between[i - 1];
         }
         let end = points - 1;
         let mut above = vec![0.0; points];
-        above[end] = counts.tail_above(grid(end));
+        above[end] = all_above(counts, grid(end), stride);
         for i in (0..end).rev() {
             above[i] = above[i + 1] + at[i + 1] + between[i];
         }
@@ -235,6 +227,74 @@ fn ln_of(p: f64, complement: f64) -> f64 {
     }
 }
 
+/// Points of a grid are as many to a standard deviation, or a few more.
+pub(crate) fn stride(sigma: f64, points_per_sigma: f64) -> u64 {
+    let stride = ((sigma / points_per_sigma) as u64).max(1);
+    if stride < SMOOTH {
+        stride
+    } else {
+        stride / 4 * 4
+    }
+}
+
+/// Strides from which on the probabilities between two grid points are taken for a smooth curve: chosen. With a sixth of a standard deviation, sums
+/// are off by less than 10⁻⁶ out to six standard deviations, and by 10⁻⁵ out to eight.
+const SMOOTH: u64 = 64;
+
+/// P(k < N < k + stride): by Boole's rule and the first terms of Euler and Maclaurin's formula where the stride is long.
+fn between(counts: &Counts, k: u64, stride: u64) -> f64 {
+    if stride < SMOOTH {
+        let mut term = counts.probability(k);
+        let terms = (k..k + stride - 1).map(|k| {
+            term *= counts.ratio(k);
+            term
+        });
+        return terms.sum();
+    }
+    debug_assert!(stride.is_multiple_of(4), "{stride}");
+    let at = [0, 1, 2, 3, 4].map(|quarter| counts.probability(k + quarter * (stride / 4)));
+    let boole = 7.0 * (at[0] + at[4]) + 32.0 * (at[1] + at[3]) + 12.0 * at[2];
+    let slope = |k: u64, at: f64| {
+        if k == 0 || at == 0.0 {
+            return 0.0;
+        }
+        0.5 * at * (counts.ratio(k) - 1.0 / counts.ratio(k - 1))
+    };
+    let slopes = slope(k + stride, at[4]) - slope(k, at[0]);
+    (stride as f64 * boole / 90.0 - 0.5 * (at[0] + at[4]) + slopes / 12.0).max(0.0)
+}
+
+/// P(N < k).
+fn all_below(counts: &Counts, k: u64, stride: u64) -> f64 {
+    let (mut k, mut sum) = (k, 0.0);
+    while stride >= SMOOTH && k >= stride {
+        k -= stride;
+        let part = counts.probability(k) + between(counts, k, stride);
+        sum += part;
+        if part <= 1e-18 * sum {
+            return sum;
+        }
+    }
+    sum + sum_outwards(counts.probability(k), (0..k).rev(), |k| {
+        1.0 / counts.ratio(k)
+    })
+}
+
+/// P(N > k).
+fn all_above(counts: &Counts, k: u64, stride: u64) -> f64 {
+    if stride < SMOOTH {
+        return counts.tail_above(k);
+    }
+    let (mut k, mut sum) = (k, 0.0);
+    loop {
+        let part = between(counts, k, stride) + counts.probability(k + stride);
+        (k, sum) = (k + stride, sum + part);
+        if part <= 1e-18 * sum {
+            return sum;
+        }
+    }
+}
+
 /// Sums `term`·ratio, ·ratio², … over `steps` until it no longer matters. Stops before denormal numbers, which
 /// a ratio just below 1 would never shrink to nothing.
 fn sum_outwards(
@@ -251,4 +311,46 @@ fn sum_outwards(
         }
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+        /// The sums of long strides are those of every count.
+        #[test]
+        fn long_strides_lose_nothing(
+            ln_mean in 12.0f64..15.5,
+            share in prop_oneof![Just(0.0), 0.001f64..0.9],
+            points_per_sigma in prop_oneof![Just(6.0), Just(24.0)],
+        ) {
+            let mean = libm::exp(ln_mean) * if points_per_sigma > 6.0 { 16.0 } else { 1.0 };
+            let counts = if share > 0.0 {
+                Counts::Bernoulli {
+                    cycles: (mean / share / (1.0 - share)) as u64,
+                    photons_per_cycle: -libm::log1p(-share),
+                }
+            } else {
+                Counts::poisson(mean, 0.0)
+            };
+            let stride = stride(counts.sigma(), points_per_sigma);
+            prop_assert!(stride >= SMOOTH, "{stride}");
+            let reach = (8.0 * counts.sigma()) as u64;
+            let middle = counts.mean() as u64;
+            let (first, last) = (middle - reach, middle + reach);
+            let quick = Tails::new(&counts, first, last, stride);
+            let slow = Tails::new(&counts, first, last + stride, 1);
+            for i in 0..quick.at.len() {
+                let one = i * stride as usize;
+                for (quick, slow) in [(quick.below[i], slow.below[one]), (quick.above[i], slow.above[one])] {
+                    let error = if slow > 1e-9 { 1e-6 } else { 1e-5 };
+                    prop_assert!((quick / slow - 1.0).abs() < error, "{i}: {quick} {slow}");
+                }
+            }
+        }
+    }
 }

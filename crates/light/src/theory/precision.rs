@@ -48,7 +48,7 @@ pub fn thompson_best_ratio(background: f64, signal: f64) -> f64 {
 
 /// The Cramér-Rao bound of a Gaussian pulse, ns; arguments as in [`thompson`].
 ///
-/// Always finite: values beyond `f64` (σ below about a/100) are returned as the largest one.
+/// Always finite: values beyond `f64` (σ below about a/100, or 0) are returned as the largest one.
 pub fn cramer_rao(bin_ns: f64, sigma_ns: f64, background: f64, signal: f64) -> f64 {
     exp(ln_cramer_rao(bin_ns, sigma_ns, background, signal)).min(f64::MAX)
 }
@@ -65,6 +65,9 @@ pub fn bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
 }
 
 fn ln_bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
+    if pulse.sigma_ns() == 0.0 {
+        return f64::INFINITY;
+    }
     let (before, after) = pulse.reach_ns();
     let first = (before / bin_ns).floor() as i64 - 2;
     let last = (after / bin_ns).ceil() as i64 + 2;

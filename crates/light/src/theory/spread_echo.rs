@@ -16,7 +16,7 @@
 
 use std::f64::consts::LN_2;
 
-use super::counts::{Counts, Tails};
+use super::counts::{Counts, Tails, stride};
 use super::cycles::search;
 use super::detection::Detection;
 use crate::numerics::{gauss_legendre, normal_above};
@@ -148,7 +148,7 @@ impl SpreadEcho {
             .iter()
             .map(|(_, c)| c.sigma())
             .fold(f64::INFINITY, f64::min);
-        let stride = ((sigma / POINTS_PER_SIGMA) as u64).max(1);
+        let stride = stride(sigma, POINTS_PER_SIGMA);
         let tables: Vec<(Alike, Tails)> = (bins.into_iter())
             .map(|(bin, counts)| (bin, Tails::new(&counts, first, last, stride)))
             .collect();
