@@ -328,6 +328,11 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
         codes.into(),
         "the start value".into(),
     ]);
+    section.push([
+        "COUNTER_INIT that never raise LOCAL_STOP".into(),
+        law.silent().unwrap_or_else(|| "none".to_owned()).into(),
+        "none".into(),
+    ]);
     Some(section)
 }
 

@@ -153,8 +153,16 @@ impl Circumstances<'_> {
         }
         let wanted = self.span_m(NoDepth::OutOfReach, |p| p.guide_m);
         let (bits, periods) = (self.sensor.counter_bits, self.exposure.stop_periods);
+        let law = self.sensor.counter_law();
+        let silent = law.filter(|law| law.silent_codes().len() > 1);
+        let cure = match silent.and_then(|law| law.silent()) {
+            Some(codes) => format!(
+                "its P-counter never raises LOCAL_STOP with COUNTER_INIT {codes}; give one that does"
+            ),
+            None => "give more counter_bits or a longer laser cycle".to_owned(),
+        };
         format!(
-            "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide's estimates lie {wanted}; give more counter_bits or a longer laser cycle",
+            "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide's estimates lie {wanted}; {cure}",
             span(&ends)
         )
     }

@@ -269,9 +269,14 @@ impl SensorConfig {
         Ok(config)
     }
 
-    /// Sentences on values that are probably in another unit than their key has.
+    /// Sentences on values that are probably in another unit than their key has, and on start values that a P-counter of one's own does not serve.
     pub fn remarks(&self) -> Vec<String> {
-        remarks(&[Self::SECTION], &self.table())
+        let of_units = remarks(&[Self::SECTION], &self.table());
+        let silent = self.counter_law().and_then(|law| law.silent());
+        let silent = silent.map(|codes| {
+            format!("its P-counter never raises LOCAL_STOP with COUNTER_INIT {codes}; no window opens from these")
+        });
+        of_units.into_iter().chain(silent).collect()
     }
 
     /// What there is to know of a key of a sensor file, if it is one.

@@ -23,14 +23,17 @@ use crate::netlist::{Corner, Module, Netlist};
 /// Most cells of a block: its law is measured while somebody waits.
 pub(super) const MOST_CELLS: usize = 10_000;
 
+/// Ranges of codes that are said.
+const MOST_RANGES: usize = 3;
+
 /// Why start values open no windows that a line describes. Codes are values of COUNTER_INIT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Uneven {
     /// LOCAL_STOP is unknown.
-    #[error("LOCAL_STOP is unknown from COUNTER_INIT {0} on")]
+    #[error("LOCAL_STOP is unknown with COUNTER_INIT {0}")]
     Unknown(u16),
     /// LOCAL_STOP moves more than once with an edge of COUNTER_CLK, or with a falling one.
-    #[error("LOCAL_STOP is not one clean edge from COUNTER_INIT {0} on")]
+    #[error("LOCAL_STOP is not one clean edge with COUNTER_INIT {0}")]
     Glitch(u16),
     /// LOCAL_STOP rises with other edges after the next reset.
     #[error("COUNTER_RESET does not bring COUNTER_INIT {0} back")]
@@ -107,6 +110,47 @@ impl CounterLaw {
         let first = i64::from(first?);
         let every = second.map(|second| i64::from(second) - first);
         Some(Rises { first, every })
+    }
+
+    /// Codes from which LOCAL_STOP never rises, in order; none where nothing is known ([`CounterLaw::uneven`]).
+    pub fn silent_codes(&self) -> Vec<u16> {
+        let silent = |(_, of): &(&u16, &CountDownResult)| of.rises[0].is_none() && !of.starts_high;
+        let by_start = self.codes.iter().zip(&self.counted);
+        let mut codes: Vec<u16> = by_start.filter(silent).map(|(&code, _)| code).collect();
+        if self.uneven.is_some() {
+            codes.clear();
+        }
+        codes.sort_unstable();
+        codes
+    }
+
+    /// These codes in words, as `16 to 511 (496 of 512)`; `None` where there are none.
+    pub fn silent(&self) -> Option<String> {
+        let codes = self.silent_codes();
+        let mut ranges: Vec<[u16; 2]> = Vec::new();
+        for &code in &codes {
+            match ranges.last_mut() {
+                Some([_, last]) if *last + 1 == code => *last = code,
+                _ => ranges.push([code; 2]),
+            }
+        }
+        let range = |[first, last]: &[u16; 2]| {
+            if first == last {
+                first.to_string()
+            } else {
+                format!("{first} to {last}")
+            }
+        };
+        let mut said: Vec<String> = ranges.iter().take(MOST_RANGES).map(range).collect();
+        if ranges.len() > MOST_RANGES {
+            said.push("others".to_owned());
+        }
+        let (last, others) = said.split_last()?;
+        let said = match others {
+            [] => last.clone(),
+            _ => format!("{} and {last}", others.join(", ")),
+        };
+        Some(format!("{said} ({} of {})", codes.len(), self.codes.len()))
     }
 
     /// Measures it on the gates.
