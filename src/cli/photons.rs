@@ -14,6 +14,7 @@ use crate::photons::{
 };
 use crate::report::Table;
 use crate::request::{LightRequest, Spelling};
+use crate::scene::{MOST_BACKGROUND_HZ, MOST_PER_ECHO};
 use crate::system::TakenFrame;
 use crate::units::Time;
 
@@ -149,6 +150,17 @@ pub(super) fn run(mut args: PhotonsArgs) -> anyhow::Result<()> {
     if off > 0 {
         note(format_args!(
             "{off} of {} macropixels have no pulses, because their SPADs were off in the frame; without --frame all have some",
+            pixels.len()
+        ));
+    }
+    let is_cut = |pixel: &&u32| {
+        let light = source.facts(**pixel);
+        light.signal >= MOST_PER_ECHO || light.background_hz >= MOST_BACKGROUND_HZ
+    };
+    let cut = pixels.iter().filter(is_cut).count();
+    if cut > 0 {
+        note(format_args!(
+            "{cut} of {} macropixels get more light than is modelled: it is cut to {MOST_PER_ECHO:e} photons of an echo a laser cycle, and {MOST_BACKGROUND_HZ:e} Hz of background",
             pixels.len()
         ));
     }

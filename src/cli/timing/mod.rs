@@ -15,7 +15,9 @@ use self::tables::Subject;
 use super::SensorArgs;
 use super::settings::SiliconArgs;
 use super::voice::{busy, say_json, say_unless_quiet};
-use crate::analysis::{HighestClock, LoadTiming, ReadTiming, TimingVerdict, highest_clock};
+use crate::analysis::{
+    ClockRange, LoadTiming, ReadTiming, TimingAnalysis, TimingVerdict, clock_ranges,
+};
 use crate::chip::{Limits, SensorConfig, Silicon, Tdc};
 use crate::files::InputError;
 
@@ -87,8 +89,8 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
         let tightest = spread.tightest();
         (tightest.row, tightest.col)
     });
-    let verdict = TimingVerdict::analyse(&config, &silicon, position);
-    let highest = highest_clock(&config, &silicon, position);
+    let analysis = TimingAnalysis::new(&config, &silicon, position);
+    let (verdict, ranges) = (analysis.at_clk(config.clk_hz), clock_ranges(&analysis));
     let mut sections = vec![
         condition_table(&args.silicon, &config, &silicon),
         tables::verdict(&verdict),
@@ -119,13 +121,16 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     if args.json {
         let mut document = serde_json::Map::new();
         document.insert("timing".to_owned(), serde_json::to_value(verdict.report())?);
-        document.insert("highest_clk".to_owned(), highest_report(highest.as_ref()));
+        document.insert(
+            "clk_ranges".to_owned(),
+            ranges.iter().map(range_report).collect(),
+        );
         for section in &sections {
             section.add_to(&mut document);
         }
         say_json(&document)?;
     } else {
-        say_unless_quiet(answer(&config, &verdict, highest.as_ref()))?;
+        say_unless_quiet(answer(&config, &verdict, &ranges))?;
         for section in &sections {
             say_unless_quiet(section.text())?;
         }
@@ -134,22 +139,29 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
 }
 
 /// The first line: whether the chip keeps its timing, how fast it may be clocked, and what limits it.
-fn answer(
-    config: &SensorConfig,
-    verdict: &TimingVerdict,
-    highest: Option<&HighestClock>,
-) -> String {
+fn answer(config: &SensorConfig, verdict: &TimingVerdict, ranges: &[ClockRange]) -> String {
     let own_mhz = config.clk_hz / 1e6;
     let kept = if verdict.is_met() { "keeps" } else { "breaks" };
-    let rest = match highest {
-        None => "at every CLK down to a sixteenth of it, too".to_owned(),
-        Some(HighestClock { clk_hz, limit }) => {
-            let up_to = format!("it works up to {:.1} MHz", clk_hz / 1e6);
-            match limit {
-                Some(limit) => format!("{up_to}, limited by {} ({})", limit.check, limit.path),
-                None => format!("{up_to} or more"),
-            }
+    let said = |range: &ClockRange| {
+        let to_mhz = range.to_hz / 1e6;
+        let within = match range.from_hz {
+            None => format!("up to {to_mhz:.1} MHz"),
+            Some(from_hz) => format!("from {:.1} to {to_mhz:.1} MHz", from_hz / 1e6),
+        };
+        let limit = range
+            .limit
+            .as_ref()
+            .filter(|_| range.contains(config.clk_hz));
+        match limit {
+            Some(limit) => format!("{within}, limited by {}", limit.cause()),
+            None => within,
         }
+    };
+    let said: Vec<String> = ranges.iter().map(said).collect();
+    let works = match said.split_last() {
+        None => "It does at every CLK.".to_owned(),
+        Some((last, [])) => format!("It works {last}."),
+        Some((last, others)) => format!("It works {}, and {last}.", others.join(", ")),
     };
     let uneven = config
         .counter_law()
@@ -157,20 +169,18 @@ fn answer(
         .map_or(String::new(), |why| {
             format!(" Its P-counter cannot be used: {why}.")
         });
-    format!("This chip {kept} its timing at {own_mhz} MHz; {rest}.{uneven}\n")
+    format!("This chip {kept} its timing at {own_mhz} MHz. {works}{uneven}\n")
 }
 
-/// The highest CLK as JSON: `null` where there is none.
-fn highest_report(highest: Option<&HighestClock>) -> serde_json::Value {
-    let report = |highest: &HighestClock| {
-        let limit = highest.limit.as_ref();
-        serde_json::json!({
-            "mhz": highest.clk_hz * 1e-6,
-            "check": limit.map(|limit| &limit.check),
-            "path": limit.map(|limit| &limit.path),
-        })
-    };
-    highest.map_or(serde_json::Value::Null, report)
+/// A range of CLK as JSON; from `null` on, if slower clocks work, too.
+fn range_report(range: &ClockRange) -> serde_json::Value {
+    let limit = range.limit.as_ref();
+    serde_json::json!({
+        "from_mhz": range.from_hz.map(|from_hz| from_hz * 1e-6),
+        "to_mhz": range.to_hz * 1e-6,
+        "check": limit.map(|limit| &limit.check),
+        "path": limit.map(|limit| &limit.path),
+    })
 }
 
 fn condition_table(args: &SiliconArgs, config: &SensorConfig, silicon: &Silicon) -> Section {

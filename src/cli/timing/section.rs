@@ -91,6 +91,9 @@ impl Section {
 
     /// The table for a terminal, title first and an empty line last.
     pub(super) fn text(&self) -> String {
+        if self.rows.is_empty() {
+            return format!("{}\n\n", self.title);
+        }
         let mut grid = Grid::new(self.headings.iter().copied());
         for row in &self.rows {
             grid.push(row.iter().map(SectionCell::text));

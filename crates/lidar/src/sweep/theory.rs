@@ -13,7 +13,7 @@ use crate::settings::{keys, words};
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::design::share_inside;
 use crate::theory::detection::{Detection, DetectionModel, PerCycle, probability};
-use crate::theory::precision::{cramer_rao, range_m, thompson};
+use crate::theory::precision::{cramer_rao, cramer_rao_one_a_cycle, range_m, thompson};
 use crate::theory::spread_echo::{Hits, SpreadEcho};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -167,14 +167,21 @@ impl Wall {
         };
         let wall = Wall {
             laser_cycles: 1,
-            model: Counts::Gaussian,
+            model: match self.model {
+                Counts::Bernoulli => Counts::Bernoulli,
+                Counts::Poisson | Counts::Gaussian | Counts::GaussianAsPrinted => Counts::Gaussian,
+            },
             goal_detection: None,
             ..wall
         };
         let bound_of_one_cycle = match last.bound_m {
             Some((known, bound_m)) if known == wall => bound_m,
             _ => {
-                let bound_ns = cramer_rao(
+                let bound = match wall.model {
+                    Counts::Bernoulli => cramer_rao_one_a_cycle,
+                    _ => cramer_rao,
+                };
+                let bound_ns = bound(
                     bin_s * 1e9,
                     rig.pulse_sigma_ns,
                     light.background,
@@ -303,7 +310,20 @@ mod tests {
             number("p_right"),
             number("p_detection") * number("share_in_window")
         );
-        assert!(number("precision_thompson_m") > 0.0 && number("precision_bound_m") > 0.0);
+        // Every photon counts: the bound is that of its formula. One hit a bin and laser cycle tells less.
+        let all = TheorySettings {
+            model: Counts::Poisson,
+            ..asked
+        };
+        let of_all =
+            Wall::new(Rig::new(&sensor, &scene), &all).results(&mut TheoryCache::default());
+        let at = columns()
+            .iter()
+            .position(|c| c.name == "precision_bound_m")
+            .unwrap();
+        let of_all = of_all[at].number().unwrap();
+        assert!(of_all > 0.0 && number("precision_bound_m") > of_all);
+        assert!(number("precision_thompson_m") > 0.0);
         assert!((number("window_m") - 16.0 * number("bin_m")).abs() < 1e-12);
 
         let longer = Wall {

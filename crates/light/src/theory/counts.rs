@@ -184,11 +184,11 @@ pub struct Tails {
 }
 
 impl Tails {
-    /// Tabulates `counts`. Few points between two grid points are summed by recurrence from the lower one, so no rounding travels further than
-    /// one stride; many are those of a smooth curve ([`between`]).
-    pub(crate) fn new(counts: &Counts, first: u64, last: u64, stride: u64) -> Self {
-        let grid = |i: usize| first + i as u64 * stride;
-        let points = ((last - first).div_ceil(stride) + 1) as usize;
+    /// Tabulates `counts`. The points between two grid points are summed by recurrence from the lower one, so no rounding travels further than
+    /// one stride; those of a [`Stride::smooth`] one are those of a curve.
+    pub(crate) fn new(counts: &Counts, first: u64, last: u64, stride: Stride) -> Self {
+        let grid = |i: usize| first + i as u64 * stride.counts;
+        let points = ((last - first).div_ceil(stride.counts) + 1) as usize;
         let at: Vec<f64> = (0..points).map(|i| counts.probability(grid(i))).collect();
         let between: Vec<f64> = (0..points)
             .map(|i| between(counts, grid(i), stride))
@@ -227,23 +227,47 @@ fn ln_of(p: f64, complement: f64) -> f64 {
     }
 }
 
-/// Points of a grid are as many to a standard deviation, or a few more.
-pub(crate) fn stride(sigma: f64, points_per_sigma: f64) -> u64 {
-    let stride = ((sigma / points_per_sigma) as u64).max(1);
-    if stride < SMOOTH {
-        stride
-    } else {
-        stride / 4 * 4
+/// The way from one grid point to the next.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stride {
+    pub(crate) counts: u64,
+    is_smooth: bool,
+}
+
+/// Strides from which on the probabilities between two grid points may be taken for a smooth curve: chosen. With a sixth of a standard deviation,
+/// sums are off by less than 10⁻⁶ out to six standard deviations, and by 10⁻⁵ out to eight.
+const SMOOTH: u64 = 64;
+
+impl Stride {
+    /// One with as many points to a standard deviation, summed count by count.
+    pub(crate) fn exact(sigma: f64, points_per_sigma: f64) -> Self {
+        Stride {
+            counts: ((sigma / points_per_sigma) as u64).max(1),
+            is_smooth: false,
+        }
+    }
+
+    /// The same, or a little less, by a curve where the counts are many.
+    pub(crate) fn smooth(sigma: f64, points_per_sigma: f64) -> Self {
+        let Stride { counts, .. } = Self::exact(sigma, points_per_sigma);
+        Stride {
+            counts: if counts < SMOOTH {
+                counts
+            } else {
+                counts / 4 * 4
+            },
+            is_smooth: counts >= SMOOTH,
+        }
     }
 }
 
-/// Strides from which on the probabilities between two grid points are taken for a smooth curve: chosen. With a sixth of a standard deviation, sums
-/// are off by less than 10⁻⁶ out to six standard deviations, and by 10⁻⁵ out to eight.
-const SMOOTH: u64 = 64;
-
 /// P(k < N < k + stride): by Boole's rule and the first terms of Euler and Maclaurin's formula where the stride is long.
-fn between(counts: &Counts, k: u64, stride: u64) -> f64 {
-    if stride < SMOOTH {
+fn between(counts: &Counts, k: u64, stride: Stride) -> f64 {
+    let Stride {
+        counts: stride,
+        is_smooth,
+    } = stride;
+    if !is_smooth {
         let mut term = counts.probability(k);
         let terms = (k..k + stride - 1).map(|k| {
             term *= counts.ratio(k);
@@ -265,10 +289,10 @@ fn between(counts: &Counts, k: u64, stride: u64) -> f64 {
 }
 
 /// P(N < k).
-fn all_below(counts: &Counts, k: u64, stride: u64) -> f64 {
+fn all_below(counts: &Counts, k: u64, stride: Stride) -> f64 {
     let (mut k, mut sum) = (k, 0.0);
-    while stride >= SMOOTH && k >= stride {
-        k -= stride;
+    while stride.is_smooth && k >= stride.counts {
+        k -= stride.counts;
         let part = counts.probability(k) + between(counts, k, stride);
         sum += part;
         if part <= 1e-18 * sum {
@@ -281,14 +305,14 @@ fn all_below(counts: &Counts, k: u64, stride: u64) -> f64 {
 }
 
 /// P(N > k).
-fn all_above(counts: &Counts, k: u64, stride: u64) -> f64 {
-    if stride < SMOOTH {
+fn all_above(counts: &Counts, k: u64, stride: Stride) -> f64 {
+    if !stride.is_smooth {
         return counts.tail_above(k);
     }
     let (mut k, mut sum) = (k, 0.0);
     loop {
-        let part = between(counts, k, stride) + counts.probability(k + stride);
-        (k, sum) = (k + stride, sum + part);
+        let part = between(counts, k, stride) + counts.probability(k + stride.counts);
+        (k, sum) = (k + stride.counts, sum + part);
         if part <= 1e-18 * sum {
             return sum;
         }
@@ -337,15 +361,15 @@ mod tests {
             } else {
                 Counts::poisson(mean, 0.0)
             };
-            let stride = stride(counts.sigma(), points_per_sigma);
-            prop_assert!(stride >= SMOOTH, "{stride}");
+            let stride = Stride::smooth(counts.sigma(), points_per_sigma);
+            prop_assert!(stride.is_smooth, "{stride:?}");
             let reach = (8.0 * counts.sigma()) as u64;
             let middle = counts.mean() as u64;
             let (first, last) = (middle - reach, middle + reach);
             let quick = Tails::new(&counts, first, last, stride);
-            let slow = Tails::new(&counts, first, last + stride, 1);
+            let slow = Tails::new(&counts, first, last + stride.counts, Stride::exact(1.0, 1.0));
             for i in 0..quick.at.len() {
-                let one = i * stride as usize;
+                let one = i * stride.counts as usize;
                 for (quick, slow) in [(quick.below[i], slow.below[one]), (quick.above[i], slow.above[one])] {
                     let error = if slow > 1e-9 { 1e-6 } else { 1e-5 };
                     prop_assert!((quick / slow - 1.0).abs() < error, "{i}: {quick} {slow}");

@@ -16,7 +16,7 @@
 //! Gaussian times e^(−π²β/h), β ≈ σ/√(2 ln M) being how sharply F^M rises; h = σ/24 keeps it below 10⁻¹⁶
 //! for any M below 10⁶.
 
-use super::counts::{Counts, Tails, stride};
+use super::counts::{Counts, Stride, Tails};
 use super::gaussian;
 use crate::numerics::ln_exprel_neg;
 
@@ -130,8 +130,9 @@ pub(crate) fn compare(signal: &Counts, background: &Counts, bins: u32, ties: Tie
         return Detection::new(1.0, 0.0);
     }
     let sigma = signal.sigma().min(background.sigma());
-    let stride = stride(sigma, POINTS_PER_SIGMA);
+    let stride = Stride::exact(sigma, POINTS_PER_SIGMA);
     let tails = Tails::new(background, first, last, stride);
+    let stride = stride.counts;
     let (mut hit, mut miss) = (0.0, 0.0);
     for i in 0..tails.at.len() {
         let here = signal.probability(first + i as u64 * stride);

@@ -55,16 +55,44 @@ pub fn cramer_rao(bin_ns: f64, sigma_ns: f64, background: f64, signal: f64) -> f
 
 /// ln of [`cramer_rao`], which never overflows.
 pub fn ln_cramer_rao(bin_ns: f64, sigma_ns: f64, background: f64, signal: f64) -> f64 {
-    ln_bound(&Pulse::Gaussian { sigma_ns }, bin_ns, background, signal)
+    let pulse = Pulse::Gaussian { sigma_ns };
+    ln_bound(&pulse, bin_ns, background, signal, |ln_photons| ln_photons)
+}
+
+/// The Cramér-Rao bound of a Gaussian pulse, ns, after one laser cycle in which a bin counts one hit at most, however many photons come;
+/// `background` and `signal` are photons of one laser cycle. After N of them it is less by √N.
+///
+/// A bin counts with probability p = 1 − e^(−λ), so that its information is (dp/dε)²/(p(1 − p)) = (dλ/dε)²/(e^λ − 1): λ of
+/// [`cramer_rao`] becomes e^λ − 1. Finite as that is.
+pub fn cramer_rao_one_a_cycle(bin_ns: f64, sigma_ns: f64, background: f64, signal: f64) -> f64 {
+    let pulse = Pulse::Gaussian { sigma_ns };
+    let ln_expm1 = |ln_photons: f64| {
+        let photons = exp(ln_photons);
+        if photons < 1e-9 {
+            ln_photons
+        } else {
+            photons + log(-libm::expm1(-photons))
+        }
+    };
+    exp(ln_bound(&pulse, bin_ns, background, signal, ln_expm1)).min(f64::MAX)
 }
 
 /// The Cramér-Rao bound, ns, for a `pulse` of any shape; infinite when the pulse fits into a bin with room to
 /// spare, because such a pulse tells nothing of its place. `background` µ_B per bin, `signal` µ_S.
 pub fn bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
-    exp(ln_bound(pulse, bin_ns, background, signal))
+    exp(ln_bound(pulse, bin_ns, background, signal, |ln_photons| {
+        ln_photons
+    }))
 }
 
-fn ln_bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
+/// ln of the bound where counts of mean λ tell (dλ/dε)²/v of the place; `ln_v` gives ln v of ln λ.
+fn ln_bound(
+    pulse: &Pulse,
+    bin_ns: f64,
+    background: f64,
+    signal: f64,
+    ln_v: impl Fn(f64) -> f64,
+) -> f64 {
     if pulse.sigma_ns() == 0.0 {
         return f64::INFINITY;
     }
@@ -79,7 +107,7 @@ fn ln_bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
     let information = |position: f64| {
         let terms = (first..=last).step_by(stride as usize).map(|i| {
             let from = (i as f64 - 0.5) * bin_ns - position;
-            ln_information(pulse, from, from + bin_ns, background, signal)
+            ln_information(pulse, from, from + bin_ns, (background, signal), &ln_v)
         });
         terms.fold(f64::NEG_INFINITY, ln_sum_exp) + log(stride as f64)
     };
@@ -113,8 +141,8 @@ pub fn bound_in_bins(
                 pulse,
                 bin[0] - position,
                 bin[1] - position,
-                background,
-                signal,
+                (background, signal),
+                &|ln_photons| ln_photons,
             )
         });
         terms.fold(f64::NEG_INFINITY, ln_sum_exp)
@@ -126,13 +154,20 @@ pub fn bound_in_bins(
     ))
 }
 
-/// ln of what one bin contributes to the information about the pulse's position: ln((µ_S·slope)²/(µ_B + µ_S·share)).
-fn ln_information(pulse: &Pulse, from: f64, to: f64, background: f64, signal: f64) -> f64 {
+/// ln of what one bin contributes to the information about the pulse's position: ln((µ_S·slope)²/v(µ_B + µ_S·share)).
+fn ln_information(
+    pulse: &Pulse,
+    from: f64,
+    to: f64,
+    (background, signal): (f64, f64),
+    ln_v: &impl Fn(f64) -> f64,
+) -> f64 {
     let bin = pulse.ln_bin(from, to);
     if bin.slope == f64::NEG_INFINITY {
         return f64::NEG_INFINITY;
     }
-    2.0 * (log(signal) + bin.slope) - ln_sum_exp(log(background), log(signal) + bin.share)
+    let ln_photons = ln_sum_exp(log(background), log(signal) + bin.share);
+    2.0 * (log(signal) + bin.slope) - ln_v(ln_photons)
 }
 
 /// Pulse positions in \[`first`, `last`\] between which 1/FI is smooth: halving steps towards the middle of each of
@@ -177,7 +212,8 @@ fn ln_root_mean(ln_information: impl Fn(f64) -> f64, breaks: &[f64]) -> f64 {
     // Logarithms are rounded in proportion to their size, which no quadrature gets below.
     let tolerance = 1e-15 * (1.0 + least.abs());
     let mean = integrate(|t| exp(least - ln_information(t)), breaks, tolerance) / span;
-    0.5 * (log(mean) - least)
+    // A place so much worse than all others that the quadrature misses it decides alone.
+    0.5 * (log(mean.max(f64::MIN_POSITIVE)) - least)
 }
 
 /// Laser cycles for a precision of `target_ns` by the Cramér-Rao bound, when one cycle brings `background` counts
@@ -190,4 +226,63 @@ pub fn cramer_rao_laser_cycles(
     signal: f64,
 ) -> f64 {
     (cramer_rao(bin_ns, sigma_ns, background, signal) / target_ns).powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::normal_above;
+
+    /// The chances of bins, moved a little either way, at places all over a bin.
+    fn one_a_cycle_by_differences(sigma: f64, background: f64, signal: f64) -> f64 {
+        const PLACES: u32 = 400;
+        const MOVE: f64 = 1e-5;
+        let chance = |bin: i32, place: f64| {
+            let from = (f64::from(bin) - 0.5 - place) / sigma;
+            let share = normal_above(from) - normal_above(from + 1.0 / sigma);
+            -libm::expm1(-(background + signal * share))
+        };
+        let variance = |place: f64| {
+            let of_bin = |bin: i32| {
+                let slope = (chance(bin, place + MOVE) - chance(bin, place - MOVE)) / (2.0 * MOVE);
+                let here = chance(bin, place);
+                slope * slope / (here * (1.0 - here))
+            };
+            1.0 / (-12..=12).map(of_bin).sum::<f64>()
+        };
+        let places = (0..PLACES).map(|n| (f64::from(n) + 0.5) / f64::from(PLACES) - 0.5);
+        (places.map(variance).sum::<f64>() / f64::from(PLACES)).sqrt()
+    }
+
+    #[test]
+    fn one_hit_a_cycle_tells_less_in_strong_light() {
+        for (sigma, background, signal) in [
+            (0.7, 0.01, 0.3),
+            (0.7, 0.05, 3.0),
+            (1.5, 0.2, 1.0),
+            (1.5, 1e-6, 8.0),
+        ] {
+            let found = cramer_rao_one_a_cycle(1.0, sigma, background, signal);
+            let slow = one_a_cycle_by_differences(sigma, background, signal);
+            assert!((found / slow - 1.0).abs() < 1e-3, "{found} {slow}");
+            assert!(found > cramer_rao(1.0, sigma, background, signal));
+        }
+        let dim = cramer_rao_one_a_cycle(1.0, 0.7, 1e-7, 1e-6);
+        assert!((dim / cramer_rao(1.0, 0.7, 1e-7, 1e-6) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn bounds_are_finite_at_every_extreme() {
+        for sigma in [0.0, 1e-6, 1.0, 1e4] {
+            for background in [0.0, 1e-9, 1.0, 1e9] {
+                for signal in [1e-12, 1.0, 1e12] {
+                    let found = cramer_rao_one_a_cycle(1.0, sigma, background, signal);
+                    assert!(
+                        found > 0.0 && found.is_finite(),
+                        "{sigma} {background} {signal}: {found}"
+                    );
+                }
+            }
+        }
+    }
 }

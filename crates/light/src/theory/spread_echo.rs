@@ -16,7 +16,7 @@
 
 use std::f64::consts::LN_2;
 
-use super::counts::{Counts, Tails, stride};
+use super::counts::{Counts, Stride, Tails};
 use super::cycles::search;
 use super::detection::Detection;
 use crate::numerics::{gauss_legendre, normal_above};
@@ -148,7 +148,7 @@ impl SpreadEcho {
             .iter()
             .map(|(_, c)| c.sigma())
             .fold(f64::INFINITY, f64::min);
-        let stride = stride(sigma, POINTS_PER_SIGMA);
+        let stride = Stride::smooth(sigma, POINTS_PER_SIGMA);
         let tables: Vec<(Alike, Tails)> = (bins.into_iter())
             .map(|(bin, counts)| (bin, Tails::new(&counts, first, last, stride)))
             .collect();
@@ -173,8 +173,8 @@ impl SpreadEcho {
             };
             let right = self.by_lot(|u| wins(true, u));
             let wrong = self.by_lot(|u| wins(false, u));
-            hit += right * stride as f64;
-            miss += wrong * stride as f64;
+            hit += right * stride.counts as f64;
+            miss += wrong * stride.counts as f64;
         }
         (hit, miss)
     }

@@ -23,13 +23,13 @@ mod tests;
 
 /// Most photons of an echo per cycle that are modelled. Sixteen SPADs saturate long before, and a
 /// surface right before the lens would ask for 10¹⁰.
-const MOST_PER_ECHO: f64 = 1e4;
+pub const MOST_PER_ECHO: f64 = 1e4;
 
 /// Most photons per cycle of a ray, so that sums stay finite.
 const MOST_PER_RAY: f64 = 1e12;
 
 /// Highest background rate that is modelled, far beyond saturation.
-const MOST_BACKGROUND_HZ: f64 = 1e11;
+pub const MOST_BACKGROUND_HZ: f64 = 1e11;
 
 /// Femtoseconds that light takes for a metre there and back.
 const FLIGHT_FS_PER_M: f64 = 2e15 / SPEED_OF_LIGHT_M_PER_S;

@@ -131,7 +131,7 @@ impl Lidar {
         let nm = self.warm_wavelength_nm();
         if self.laser_transmission() <= 0.0 {
             let message = format!(
-                "filter lets nothing of the laser's {nm} nm through at {} C; give a filter that does, or another wavelength_nm",
+                "filter lets nothing of the laser's {nm} nm through at {} C; give another filter_centre_nm, filter or wavelength_nm",
                 self.temperature_c
             );
             return fault("filter", message);

@@ -153,8 +153,8 @@ keys! {
         filter: CurveSetting<FilterWord> = CurveSetting::default(),
             in WordOrCurve(FilterWord::NAMES, "wavelength in nm and transmittance"),
             from "thesis 2.3.3";
-        /// Centre of the filter, if it is given as a shape.
-        filter_centre_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4), from "the laser";
+        /// Centre of the filter, if it is given as a shape; it does not follow wavelength_nm.
+        filter_centre_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4), from "chosen: the laser's default";
         /// Full width at half maximum of the filter, if it is given as a shape.
         filter_fwhm_nm: f64 ["nm"] = 10.0, in Above(0.0, 1e4), usually (0.01, 1000.0);
         /// Growth of the filter's wavelengths with temperature.
@@ -217,23 +217,24 @@ impl Lidar {
         let CurveSetting::Word(filter) = &self.filter else {
             return None;
         };
+        if filter.shape().is_some() {
+            // Both the sunlight and the laser's go through it.
+            let (centre_nm, fwhm_nm) = (self.filter_centre_nm, self.filter_fwhm_nm);
+            let is_off = (laser_nm - centre_nm).abs() > 0.5 * fwhm_nm;
+            return is_off.then(|| {
+                format!(
+                    "in [lidar], the laser has {laser_nm} nm, and the filter at {centre_nm} nm, {fwhm_nm} nm wide, passes less than half of its light; give filter_centre_nm = {laser_nm}"
+                )
+            });
+        }
         let by_default = Lidar::default();
-        let (centre_nm, fwhm_nm, advice) = if filter.shape().is_some() {
-            (
-                self.filter_centre_nm,
-                self.filter_fwhm_nm,
-                format!("give filter_centre_nm = {laser_nm}"),
+        let (centre_nm, fwhm_nm) = (by_default.wavelength_nm, by_default.filter_fwhm_nm);
+        let is_off = (laser_nm - centre_nm).abs() > fwhm_nm
+            && self.solar_irradiance_w_m2 == by_default.solar_irradiance_w_m2;
+        is_off.then(|| {
+            format!(
+                "in [lidar], the laser has {laser_nm} nm, and sunlight comes through a filter at {centre_nm} nm, {fwhm_nm} nm wide; give filter = \"top_hat\" with filter_centre_nm = {laser_nm}, or solar_irradiance_w_m2 of that band"
             )
-        } else if self.solar_irradiance_w_m2 == by_default.solar_irradiance_w_m2 {
-            let advice = format!(
-                "give filter = \"top_hat\" with filter_centre_nm = {laser_nm}, or solar_irradiance_w_m2 of that band"
-            );
-            (by_default.wavelength_nm, by_default.filter_fwhm_nm, advice)
-        } else {
-            return None;
-        };
-        ((laser_nm - centre_nm).abs() > fwhm_nm).then(|| {
-            format!("in [lidar], the laser has {laser_nm} nm, and sunlight comes through a filter at {centre_nm} nm, {fwhm_nm} nm wide; {advice}")
         })
     }
 
@@ -334,7 +335,7 @@ keys! {
     pub struct Light {
         /// Illuminance of the scene by the sun.
         ///
-        /// 100 klux is full sun. With a place for the sun, that of a surface that faces it.
+        /// 100 klux is full sun. With a place for the sun, that of a surface that faces it: level ground has less by the sine of sun_elevation_deg.
         illuminance_klux: f64 ["klux"] = 50.0,
             in Limited(0.0, 200.0, "the sun with bright clouds about it stays below 150 klux"),
             from CHOSEN;

@@ -3,7 +3,7 @@
 //! All delays and limits scale by one factor ([`Conditions::delay_factor`]), so the search is for the factor from
 //! which on the macropixel no longer works, and then for the conditions that have it.
 
-use super::{Aim, MacropixelTiming};
+use super::{Aim, LocalClocks, MacropixelTiming};
 use crate::chip::{Limits, SensorConfig, Silicon};
 use crate::netlist::{Conditions, Corner};
 use crate::units::Time;
@@ -44,42 +44,62 @@ pub fn factor_range(
     silicon: &Silicon,
     limits: Limits,
 ) -> Option<FactorRange> {
-    const ONE: u32 = 100_000;
-    const NEAR_NONE: u32 = 1_000;
-    const STEP: u32 = 2_000;
+    const ONE: u64 = 100_000;
+    const NEAR_NONE: u64 = 1_000;
+    /// Of a factor.
+    const STEP: f64 = 0.02;
     let (period, phase) = (config.clock().period(), config.stop_phase());
-    let timing = |steps: u32| {
-        let scaled = silicon.with_factor(f64::from(steps) * 1e-5);
+    let timing = |steps: u64| {
+        let scaled = silicon.with_factor(steps as f64 * 1e-5);
         MacropixelTiming::analyse(config, &scaled, limits, (0, 0))
     };
     let library = timing(ONE).aim(period, phase);
     let works = |steps, aim| timing(steps).slack(period, phase, aim) >= Time::ZERO;
     let tried = [(ONE, library), (NEAR_NONE, Aim::SLOW)];
     let (start, aim) = tried.into_iter().find(|&(steps, aim)| works(steps, aim))?;
-    let between = |mut good: u32, mut bad: u32| {
+    let between = |works: &dyn Fn(u64) -> bool, mut good: u64, mut bad: u64| {
         while good.abs_diff(bad) > 1 {
             let middle = (good + bad) / 2;
-            if works(middle, aim) {
+            if works(middle) {
                 good = middle;
             } else {
                 bad = middle;
             }
         }
-        f64::from(good) * 1e-5
+        good
     };
-    let bad = (1..)
-        .map(|k| start + k * STEP)
-        .find(|&steps| !works(steps, aim));
-    let bad = bad.expect("no chip works at any delay");
-    let slowest = between(bad - STEP, bad);
+    let works = |steps| works(steps, aim);
+    // The front end follows SPADs at any CLK, but not with any delays.
+    let follows = |steps: u64| {
+        let scaled = silicon.with_factor(steps as f64 * 1e-5);
+        let local = LocalClocks::analyse(config, &scaled);
+        let mut slacks = (local.toggles.iter())
+            .filter_map(|toggle| local.toggle_slack(toggle, config.pulse_width()));
+        slacks.all(|slack| slack >= Time::ZERO)
+    };
+    let step = |steps: u64| (steps as f64 * STEP) as u64;
+    let mut good = start;
+    while works(good + step(good)) {
+        good += step(good);
+    }
+    let mut slowest = between(&works, good, good + step(good));
+    if follows(start) && !follows(slowest) {
+        slowest = between(&follows, start, slowest);
+    }
     // Down to delays near none, to the first that fails.
-    let mut faster = (1..)
-        .map_while(|k| start.checked_sub(k * STEP))
-        .filter(|&s| s >= NEAR_NONE);
-    let bad = faster.find(|&steps| !works(steps, aim));
+    let mut good = start;
+    let mut fastest = None;
+    while good - step(good) >= NEAR_NONE {
+        let faster = good - step(good);
+        if !works(faster) {
+            fastest = Some(between(&works, good, faster) as f64 * 1e-5);
+            break;
+        }
+        good = faster;
+    }
     Some(FactorRange {
-        fastest: bad.map(|bad| between(bad + STEP, bad)),
-        slowest,
+        fastest,
+        slowest: slowest as f64 * 1e-5,
         moved: aim.moved(),
     })
 }

@@ -17,15 +17,15 @@
 //! | `readout` | how fast histograms can be read |
 //! | `code_density` | how equal the steps of a time-to-digital converter are |
 //! | `spread` | ripple and margin of every macropixel under mismatch |
+//! | `clock_ranges` | the ranges of CLK in which every limit is kept |
 //! | `corners` | process, voltage and temperature at which a clock fails |
-//! | `highest_clock` | the highest CLK at which every limit is kept |
 //! | `verdict` | whether all of it is met: what `timing`, `frame` and `replay` say |
 
+mod clock_ranges;
 mod code_density;
 mod corners;
 mod correlation;
 mod gates;
-mod highest_clock;
 mod load;
 mod macropixel;
 mod power;
@@ -33,17 +33,17 @@ mod readout;
 mod spread;
 mod verdict;
 
+pub use clock_ranges::{ClockRange, clock_ranges};
 pub use code_density::Linearity;
 pub use corners::{CornerLimit, FactorRange, corner_limits, factor_range};
 pub use correlation::CorrelationTiming;
 pub use gates::{ResetTiming, RippleTiming, gate_works, reset, ripple};
-pub use highest_clock::{HighestClock, highest_clock};
 pub use load::{LoadTiming, load_works};
 pub use macropixel::{Aim, LocalClocks, MacropixelTiming, longest};
 pub use power::{BlockSilicon, Capacitances, MacropixelPower};
 pub use readout::{ReadTiming, read_works};
 pub use spread::{PixelTiming, Spread, spread};
-pub use verdict::{Margin, TimingVerdict, VerdictReport};
+pub use verdict::{Margin, TimingAnalysis, TimingVerdict, VerdictReport};
 
 use crate::units::Time;
 

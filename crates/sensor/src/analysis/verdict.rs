@@ -18,7 +18,7 @@
 use serde::Serialize;
 
 use super::{Aim, LoadTiming, LocalClocks, MacropixelTiming};
-use crate::chip::front_end::DeadTimeTooShort;
+use crate::chip::front_end::{DeadTimeTooShort, PulseLimits};
 use crate::chip::window_law::WindowOutcome;
 use crate::chip::{
     ChipTiming, Conflict, Exposure, Limits, Probe, Race, SensorConfig, Silicon, Tdc, WindowLaw,
@@ -28,6 +28,9 @@ use crate::units::Time;
 
 /// Rows of memories that are analysed for LOAD_CLK: they differ in their token only.
 const LOADED_ROWS: usize = 2;
+
+/// The check of what the window law finds besides.
+const LAW: &str = "window law";
 
 /// What is left over at one place.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +43,21 @@ pub struct Margin {
     pub slack: Time,
     /// Why it is broken, where more can be said than that.
     fault: Option<Fault>,
+}
+
+impl Margin {
+    /// The limit in words: its check and path, or what the window law says.
+    pub fn cause(&self) -> String {
+        match &self.fault {
+            Some(Fault::Race(race)) if self.check == LAW => format!("the {LAW}: {race}"),
+            _ => format!("{} ({})", self.check, self.path),
+        }
+    }
+
+    /// Whether a faster CLK cannot keep the limit either: that of a path between flip-flops, or of CLK's own pulses.
+    pub(super) fn is_for_good(&self) -> bool {
+        self.check.starts_with("CLK ") && self.slack < Time::ZERO
+    }
 }
 
 /// Why a limit is broken.
@@ -117,27 +135,70 @@ impl VerdictReport {
     }
 }
 
+/// What verdicts at any CLK follow from, analysed once.
+pub struct TimingAnalysis<'c> {
+    config: &'c SensorConfig,
+    pixel: MacropixelTiming,
+    /// In the library's delays, where those of the silicon are others.
+    library: Option<MacropixelTiming>,
+    local: LocalClocks,
+    pulses: PulseLimits,
+    load: LoadTiming,
+}
+
+impl<'c> TimingAnalysis<'c> {
+    /// Analyses a sensor; where macropixels differ, the one at `position`.
+    pub fn new(config: &'c SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
+        let nominal = Silicon::new(config);
+        let pixel =
+            |silicon, position| MacropixelTiming::analyse(config, silicon, Limits::Kept, position);
+        let few_rows = SensorConfig {
+            rows: config.rows.min(LOADED_ROWS),
+            ..config.clone()
+        };
+        TimingAnalysis {
+            pixel: pixel(silicon, position),
+            library: (*silicon != nominal).then(|| pixel(&nominal, (0, 0))),
+            local: LocalClocks::analyse(config, silicon),
+            pulses: ChipTiming::measure(config, silicon).pulses,
+            load: LoadTiming::analyse(&few_rows, silicon, Limits::Kept),
+            config,
+        }
+    }
+
+    /// The verdict with another CLK; STOP's phase, LOAD_CLK and the dead time stay.
+    pub fn at_clk(&self, clk_hz: f64) -> TimingVerdict {
+        TimingVerdict::from_analysis(
+            self,
+            &SensorConfig {
+                clk_hz,
+                ..self.config.clone()
+            },
+        )
+    }
+}
+
 impl TimingVerdict {
     /// Judges the sensor at its CLK, STOP phase, LOAD_CLK and dead time; where macropixels differ, the one at `position`.
     pub fn analyse(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
+        Self::from_analysis(&TimingAnalysis::new(config, silicon, position), config)
+    }
+
+    fn from_analysis(analysis: &TimingAnalysis<'_>, config: &SensorConfig) -> Self {
         let (period, phase) = (config.clock().period(), config.stop_phase());
-        let pixel = MacropixelTiming::analyse(config, silicon, Limits::Kept, position);
-        let library = Silicon::new(config);
-        let is_library = *silicon == library;
-        let aim = if is_library {
-            pixel.aim(period, phase)
-        } else {
-            MacropixelTiming::analyse(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
-        };
-        let mut margins = pixel_margins(&pixel, period, phase, aim);
-        margins.extend(local_margins(config, silicon));
-        margins.extend(load_margins(config, silicon));
+        let TimingAnalysis { pixel, library, .. } = analysis;
+        let aim = library.as_ref().unwrap_or(pixel).aim(period, phase);
+        let mut margins = pixel_margins(pixel, config, aim);
+        margins.extend(local_margins(config, &analysis.local, &analysis.pulses));
+        margins.extend(load_margins(config, &analysis.load));
         // The law also knows what reset P-counters of other kinds wait for, and is on the safe side by a rounding.
         let is_met = margins.iter().all(|margin| margin.slack >= Time::ZERO);
-        let race = (is_library && is_met).then(|| law_race(config)).flatten();
+        let race = (library.is_none() && is_met)
+            .then(|| law_race(config))
+            .flatten();
         if let Some(race) = race {
             margins.push(Margin {
-                check: "window law".to_owned(),
+                check: LAW.to_owned(),
                 path: pixel.probes.p_counter(),
                 // Where the law rounds to the safe side, too.
                 slack: race.slack().min(Time::from_fs(-1)),
@@ -145,7 +206,7 @@ impl TimingVerdict {
             });
         }
         margins.sort_by_key(|margin| margin.slack);
-        let later_windows = is_met.then(|| later_windows(config, &pixel, aim)).flatten();
+        let later_windows = is_met.then(|| later_windows(config, pixel, aim)).flatten();
         TimingVerdict {
             notes: (later_windows.iter().cloned())
                 .chain(cancelling_photons(config))
@@ -227,7 +288,8 @@ fn tightest<'r>(
 }
 
 /// Margins within one macropixel, but for those of SPADs and histogram.
-fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) -> Vec<Margin> {
+fn pixel_margins(pixel: &MacropixelTiming, config: &SensorConfig, aim: Aim) -> Vec<Margin> {
+    let (period, phase) = (config.clock().period(), config.stop_phase());
     let mut margins = tightest("CLK", "CLK", &pixel.netlist, pixel.clk.iter(), |r| {
         Some(r.slack(period))
     });
@@ -292,8 +354,7 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
 }
 
 /// Margins of flip-flops with clocks of their own.
-fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
-    let local = LocalClocks::analyse(config, silicon);
+fn local_margins(config: &SensorConfig, local: &LocalClocks, pulses: &PulseLimits) -> Vec<Margin> {
     let width = config.pulse_width();
     let mut margins = tightest(
         "SPAD_RAW",
@@ -302,7 +363,6 @@ fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
         local.toggles.iter(),
         |r| local.toggle_slack(r, width),
     );
-    let pulses = ChipTiming::measure(config, silicon).pulses;
     let fault = pulses.follow(config).err();
     for margin in margins
         .iter_mut()
@@ -323,12 +383,7 @@ fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
 }
 
 /// Margins of the load path.
-fn load_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
-    let rows = SensorConfig {
-        rows: config.rows.min(LOADED_ROWS),
-        ..config.clone()
-    };
-    let load = LoadTiming::analyse(&rows, silicon, Limits::Kept);
+fn load_margins(config: &SensorConfig, load: &LoadTiming) -> Vec<Margin> {
     let period = config.load_clock().period();
     let mut margins = tightest(
         "LOAD_CLK",

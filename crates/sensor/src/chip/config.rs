@@ -185,7 +185,7 @@ keys! {
         dead_time_seed: u32 = 1, in Within(0.0, 4_294_967_295.0);
         /// Whether a photon during the dead time restarts it.
         paralysable: bool = false;
-        /// Probability that an avalanche has an afterpulse.
+        /// Probability that a photon's or dark count's avalanche has an afterpulse, which has none itself.
         afterpulse_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
         /// Time constant of afterpulses after the dead time.
         afterpulse_time_ns: f64 ["ns"] = 5.0, in Within(0.0, 1e6), usually (0.1, 1e4);
@@ -194,7 +194,7 @@ keys! {
         /// At 50 degC, probability and time constant are those given.
         afterpulse_activation_ev: f64 ["eV"] = 0.0, in Within(0.0, 2.0),
             from "none in the thesis; Cova, Lacaita and Ripamonti, IEEE EDL 12 (1991) 685";
-        /// Probability that an avalanche fires one of its SPAD's four neighbours.
+        /// Probability that a photon's or dark count's avalanche fires one of its SPAD's four neighbours, which fires no others.
         crosstalk_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
         /// Netlist that takes the correlation block's place, as p_counter_block; for the engines gate and cycle.
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -49,22 +49,28 @@ pub(super) fn read(
 fn read_lines(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u32>), InputError> {
     let mut lines = Lines::open(path)?;
     let (mut bins, mut counts) = (0, Vec::new());
-    let mut is_first = true;
+    let (mut is_first, mut headings) = (true, None);
     while let Some((number, line)) = lines.next_used()? {
         let complain = |message: String| InputError::at_line(path.display(), number, message);
-        let cells: Vec<&str> = cells_of(line);
-        let is_heading = is_first && cells.iter().all(|cell| cell.parse::<f64>().is_err());
-        is_first = false;
-        if is_heading {
-            if let Some(word) = cells.iter().find(|cell| names_no_bin(cell)) {
+        if std::mem::take(&mut is_first)
+            && let Some(names) = headings_of(line)
+        {
+            if let Some(word) = names.iter().find(|name| names_no_bin(name)) {
                 return Err(complain(format!(
                     "has a column {word}, which is no bin; leave that column out"
                 )));
             }
+            headings = Some(names.len());
             continue;
         }
+        let cells: Vec<&str> = cells_of(line);
         if bins == 0 {
             bins = cells.len();
+            if let Some(headings) = headings.filter(|headings| *headings != bins) {
+                return Err(complain(format!(
+                    "has {bins} numbers below {headings} headings; leave columns out that are no bins (of pandas: to_csv(…, index=False))"
+                )));
+            }
         }
         if cells.len() != bins {
             return Err(complain(format!(
@@ -87,15 +93,26 @@ fn read_lines(path: &Path, counts_per_unit: Option<f64>) -> Result<(usize, Vec<u
     Ok((bins, counts))
 }
 
+/// The names in a line of headings, in which none is a number. An index has no name.
+fn headings_of(line: &str) -> Option<Vec<&str>> {
+    let between = [',', ';', '\t'].into_iter().find(|&c| line.contains(c));
+    let names = line
+        .split(between.unwrap_or(' '))
+        .map(|name| name.trim().trim_matches('"'));
+    let names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
+    let is_heading = names.iter().all(|name| name.parse::<f64>().is_err());
+    is_heading.then_some(names)
+}
+
 /// Whether a heading says that its column has something else than counts of a bin.
 fn names_no_bin(heading: &str) -> bool {
-    let word = heading.trim_matches('"').to_lowercase();
     matches!(
-        &*word,
+        &*heading.to_lowercase(),
         "zone"
             | "pixel"
             | "id"
             | "index"
+            | "unnamed: 0"
             | "row"
             | "col"
             | "column"
@@ -279,6 +296,18 @@ mod tests {
         assert!(said("{\"a\": [1, 2]}").contains("not a list"));
         let labelled = read("a.csv", b"Zone,b0,b1\n1,2,3\n").unwrap_err();
         assert!(labelled.contains("a column Zone"), "{labelled}");
+        for text in [
+            ",bin0,bin1\n0,2,3\n",
+            "\"\",bin0,bin1\n0,2,3\n",
+            "bin 0;bin 1;\n0;2;3\n",
+        ] {
+            let index = read("a.csv", text.as_bytes()).unwrap_err();
+            assert!(index.contains("3 numbers below 2 headings"), "{index}");
+        }
+        assert_eq!(
+            read("a.csv", b"bin 0,bin 1,\n2,3,\n"),
+            Ok(zones(2, &[2, 3]))
+        );
     }
 
     #[test]
