@@ -105,7 +105,7 @@ pub(in crate::cli) struct RangeArgs {
     /// File for the depths (CSV). tmf8820: capture,zone,true_m,depth_m,sensor_m; frame:
     /// row,col,start,true_m,guide_m,depth_m,bound_m,spread_m,photons_per_cycle,confidence,no_depth and
     /// depth_N_m,bound_N_m,photons_per_cycle_N of the further returns, N from 2 to 4; others:
-    /// capture,zone,depth_m,bound_m,spread_m,photons,confidence,no_depth,sensor_m and the further returns, whose photons are those of the
+    /// capture,zone,depth_m,bound_m,no_bound,spread_m,photons,confidence,no_depth,sensor_m and the further returns, whose photons are those of the
     /// whole histogram.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,

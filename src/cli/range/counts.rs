@@ -14,7 +14,7 @@ use super::returns::{number_text, write_further, write_further_head};
 use crate::cli::settings::note_unusual;
 use crate::cli::voice::{note, say_json, say_unless_quiet};
 use crate::files::{HistogramFormat, InputError, OutputFile, ZoneCounts, ZoneHistograms};
-use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn};
+use crate::ranging::{DepthOptions, DetectedReturn, Detector, NoReturn, WalkLeft};
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
 use crate::system::median;
@@ -261,6 +261,15 @@ fn table(args: &RangeArgs, detector: Option<&Detector>, zones: &[Zone]) -> Table
         "median bound, one standard deviation",
         metres(median(bounds)),
     );
+    for why in WalkLeft::ALL {
+        let count = (firsts.iter().filter(|first| first.bound_m.is_none()))
+            .filter(|first| first.no_bound == Some(why))
+            .count();
+        if count > 0 {
+            let name = format!("zones without a bound: {}", why.name());
+            table.push(name, format!("{count} of {all}"));
+        }
+    }
     let further = zones.iter().filter(|zone| zone.returns.len() > 1).count();
     table.push("zones with further returns", format!("{further} of {all}"));
     let beside: Vec<f64> = (zones.iter())
@@ -290,7 +299,7 @@ fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
     OutputFile::write_with(path, |out| {
         write!(
             out,
-            "capture,zone,depth_m,bound_m,spread_m,photons,confidence,no_depth,sensor_m"
+            "capture,zone,depth_m,bound_m,no_bound,spread_m,photons,confidence,no_depth,sensor_m"
         )?;
         write_further_head(out, "photons")?;
         writeln!(out)?;
@@ -298,11 +307,12 @@ fn write_csv(path: &Path, zones: &[Zone]) -> Result<(), InputError> {
             let first = zone.returns.first();
             write!(
                 out,
-                "{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{}",
                 zone.capture,
                 zone.zone,
                 number_text(first.map(|of| of.depth_m)),
                 number_text(first.and_then(|of| of.bound_m)),
+                first.and_then(|of| of.no_bound).map_or("", WalkLeft::name),
                 number_text(first.and_then(|of| of.spread_m)),
                 number_text(first.map(|of| of.photons)),
                 number_text(first.map(|of| of.confidence)),

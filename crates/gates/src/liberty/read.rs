@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::candidate::{Candidate, CellFunction, Role};
-use super::error::{KitError, LibertyError, PassedOver};
+use super::error::{KitError, LibertyError, PassedOver, PassedOverReason};
 use super::group;
 use super::kit::{self, LibraryFile};
 use super::mapping::{CellMap, Maker};
@@ -126,6 +126,16 @@ impl Liberty {
         let mut map = Maker::new(&read, &candidates, &passed_over, wanted).make()?;
         if conditions[0].is_none() {
             map.remarks.push(LibraryRemark::NoSupply);
+        }
+        if first.value("time_unit").is_none() {
+            map.remarks.push(LibraryRemark::NoTimeUnit);
+        }
+        let twice = passed_over.iter().filter(|cell| matches!(cell.why, PassedOverReason::Duplicate { .. }));
+        let mut twice: Vec<String> = twice.map(|cell| cell.cell.clone()).collect();
+        twice.sort_unstable();
+        twice.dedup();
+        if !twice.is_empty() {
+            map.remarks.push(LibraryRemark::Duplicates { cells: twice });
         }
         // A cell with tied pins does what it says only where they are tied.
         let is_plain = |role: &Role| !matches!(role, Role::FlipFlop(roles) if roles.tied != 0);

@@ -61,6 +61,13 @@ pub enum LibraryRemark {
     },
     /// A library that does not state its supply.
     NoSupply,
+    /// A library that does not state its unit of time.
+    NoTimeUnit,
+    /// Cells that a file has more than once.
+    Duplicates {
+        /// Their names.
+        cells: Vec<String>,
+    },
 }
 
 impl fmt::Display for LibraryRemark {
@@ -98,6 +105,16 @@ impl fmt::Display for LibraryRemark {
             LibraryRemark::NoSupply => f.write_str(
                 "no supply (nom_voltage) is stated; energies of loads are those at an assumed one",
             ),
+            LibraryRemark::NoTimeUnit => {
+                f.write_str("no time_unit is stated; times are taken for nanoseconds")
+            }
+            LibraryRemark::Duplicates { cells } => {
+                let few: Vec<&str> = cells.iter().take(3).map(String::as_str).collect();
+                let more = cells.len() - few.len();
+                let few = few.join(", ");
+                let cells = if more > 0 { format!("{few} and {more} more cells") } else { few };
+                write!(f, "{cells}: a file has such a cell more than once; the first one counts")
+            }
         }
     }
 }

@@ -32,12 +32,18 @@ pub struct EchoWidth {
     pub sigma: Time,
     /// What is late beyond that.
     pub tail: Option<DiffusionTail>,
+    /// Whether a Gaussian is near enough to the rest for bounds to hold.
+    pub is_gaussian: bool,
 }
 
 impl From<Time> for EchoWidth {
     /// A Gaussian of this standard deviation.
     fn from(sigma: Time) -> Self {
-        EchoWidth { sigma, tail: None }
+        EchoWidth {
+            sigma,
+            tail: None,
+            is_gaussian: true,
+        }
     }
 }
 

@@ -128,12 +128,14 @@ impl Scene {
         section.keys.iter().find(|key| key.name == name).copied()
     }
 
-    /// Sentences on values that are probably in another unit than their key has, and on a filter that is not for the laser.
+    /// Sentences on values that are probably in another unit than their key has, on a filter that is not for the laser, and on a pulse with
+    /// which depths have no bounds.
     pub fn remarks(&self) -> Vec<String> {
         let of_units = remarks(Scene::SECTIONS, &self.table());
         of_units
             .into_iter()
             .chain(self.lidar.remark_on_filter())
+            .chain(self.remark_on_pulse())
             .collect()
     }
 

@@ -28,6 +28,11 @@ use crate::photon::{
 use crate::settings::Fault;
 use crate::units::Time;
 
+/// Skewness and excess kurtosis of a measured pulse up to which ranging takes it for a Gaussian: chosen. Of 576 depths of a triangle (0 and −0.6) or one whose
+/// mode is early (0.2) none was beyond five bounds, from 0.1 to 3 µJ; of a rectangle (−1.2) up to 17 %, of a triangle that rises at once (0.57) 15 %.
+const MOST_SKEWNESS: f64 = 0.25;
+const MOST_KURTOSIS: f64 = 0.8;
+
 /// Samples of a measured pulse whose own are not equally far apart.
 const PULSE_SAMPLES: usize = 4096;
 
@@ -349,7 +354,18 @@ impl Scene {
         EchoWidth {
             sigma: self.pulse_resolution(),
             tail: self.lidar.diffusion_tail(),
+            is_gaussian: self.remark_on_pulse().is_none(),
         }
+    }
+
+    /// What follows from a measured pulse that is no Gaussian.
+    pub(super) fn remark_on_pulse(&self) -> Option<String> {
+        let pulse = self.measured_pulse()?;
+        let (skewness, kurtosis) = pulse.skewness_and_kurtosis(self.pulse_sigma());
+        let is_gaussian = skewness.abs() <= MOST_SKEWNESS && kurtosis.abs() <= MOST_KURTOSIS;
+        (!is_gaussian).then(|| {
+            format!("in [lidar], pulse is far from a Gaussian (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}); depths are centres of mass without a bound")
+        })
     }
 
     /// A photon stream with the measured laser pulse, if there is one, and the spread of its energy.

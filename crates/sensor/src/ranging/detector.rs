@@ -24,6 +24,7 @@ use super::arrival::{ArrivalOptions, arrival};
 use super::expected::{FiringTogether, OtherBins, Response};
 use super::finder::{DepthOptions, EchoFinder};
 use super::peak::median;
+use super::walk::WalkLeft;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 pub use crosstalk::UnknownCrosstalk;
@@ -83,6 +84,8 @@ pub struct DetectedReturn {
     pub depth_m: f64,
     /// Standard deviation of the distance, m; `None` where counts are not those of echoes of this pulse.
     pub bound_m: Option<f64>,
+    /// Why there is no bound, or one of a bin.
+    pub no_bound: Option<WalkLeft>,
     /// Standard deviation of the depths that the zone sees there, m.
     pub spread_m: Option<f64>,
     /// Photons of the echo in all laser cycles.
@@ -249,6 +252,7 @@ impl Detector {
         let first = DetectedReturn {
             depth_m,
             bound_m: first_bound_m,
+            no_bound: sighting.walk_left,
             spread_m: first_bound_m.and(spread_bins).map(spread_m),
             photons: match sighting.light {
                 Some(light) => light.signal * f64::from(all_parts),
@@ -260,6 +264,7 @@ impl Detector {
         let others = others.map(|other| DetectedReturn {
             depth_m: place_m(other.position_bins),
             bound_m: bound_m(other.position_bins, other.bound_bins),
+            no_bound: None,
             spread_m: other.spread_bins.map(spread_m),
             photons: other.photons * f64::from(all_parts),
             confidence: other.confidence,

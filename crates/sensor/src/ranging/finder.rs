@@ -128,6 +128,7 @@ impl EchoFinder {
             Tdc::DelayLine => config.delay_element().as_s(),
         };
         let laser_cycles = exposure.laser_cycles;
+        let pulse = pulse.into();
         let response = Response::new(config, bin_s, pulse);
         let laser_cycle_bins = exposure.stop(1).as_s() / bin_s;
         let recovers = response.dead_time_bins() + config.bins as f64 <= laser_cycle_bins;
@@ -137,6 +138,7 @@ impl EchoFinder {
             Tdc::Counter => Err(WalkLeft::CounterTdc),
             Tdc::Clocked if config.front_end.joins() => Err(WalkLeft::JoinedSpads),
             Tdc::Clocked if !recovers => Err(WalkLeft::ShortLaserCycle),
+            Tdc::Clocked if !pulse.is_gaussian => Err(WalkLeft::PulseShape),
             Tdc::Clocked => Ok(WalkCorrection {
                 response: complement.clone().unwrap_or_else(|| response.clone()),
                 laser_cycles,

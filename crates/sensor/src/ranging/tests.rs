@@ -22,6 +22,7 @@ const LATE: EchoWidth = EchoWidth {
         share: 0.3,
         time: Time::from_ns(3),
     }),
+    is_gaussian: true,
 };
 
 /// A start value, and the chip that counts with it.

@@ -52,6 +52,8 @@ pub enum WalkLeft {
     JoinedSpads,
     /// SPADs have not recovered from one echo before the window opens again.
     ShortLaserCycle,
+    /// The laser pulse is measured, and no Gaussian.
+    PulseShape,
     /// The counts are not those of one echo of the laser pulse.
     NotOneEcho,
     /// The echo's centre lies outside the window, and what is within does not tell its width.
@@ -66,11 +68,12 @@ pub enum WalkLeft {
 
 impl WalkLeft {
     /// Every reason.
-    pub const ALL: [WalkLeft; 9] = [
+    pub const ALL: [WalkLeft; 10] = [
         WalkLeft::DelayLine,
         WalkLeft::CounterTdc,
         WalkLeft::JoinedSpads,
         WalkLeft::ShortLaserCycle,
+        WalkLeft::PulseShape,
         WalkLeft::NotOneEcho,
         WalkLeft::CutEcho,
         WalkLeft::ToABin,
@@ -85,6 +88,7 @@ impl WalkLeft {
             WalkLeft::CounterTdc => "a counter TDC adds up SPADs",
             WalkLeft::JoinedSpads => "the front end joins SPADs",
             WalkLeft::ShortLaserCycle => "SPADs do not recover within a laser cycle",
+            WalkLeft::PulseShape => "the laser pulse is no Gaussian",
             WalkLeft::NotOneEcho => "counts are not those of one echo",
             WalkLeft::CutEcho => "the window cuts the echo off",
             WalkLeft::ToABin => "saturated, and known to a bin",
