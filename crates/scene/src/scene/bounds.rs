@@ -149,6 +149,15 @@ mod tests {
                     height_m
                 }
             ),
+            (middle(), any_way(), 0.1f64..2.0, 0f64..3.0, 0.1f64..9.0).prop_map(
+                |(centre_m, axis, radius_m, tip_radius_m, height_m)| Shape::Cone {
+                    centre_m,
+                    axis,
+                    radius_m,
+                    tip_radius_m,
+                    height_m
+                }
+            ),
             (middle(), 0.5f64..3.0, -180f64..180.0).prop_map(|(foot_m, height_m, yaw_deg)| {
                 Shape::Person {
                     foot_m,

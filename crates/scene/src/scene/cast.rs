@@ -280,7 +280,7 @@ impl<'a> Stage<'a> {
             let bundle = bundle.unwrap_or_else(|| Bundle::new(ray.direction).advanced(so_far_m));
             let placed = &self.placed[index];
             let outward = placed.normal_at(point, meeting.part);
-            let bend = |step_m| placed.bend(meeting.part, step_m);
+            let bend = |step_m| placed.bend(point, meeting.part, step_m);
             let back = RayProgress {
                 so_far_m,
                 share,

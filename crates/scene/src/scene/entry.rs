@@ -28,6 +28,7 @@ words! {
         Box = "box",
         Sphere = "sphere",
         Cylinder = "cylinder",
+        Cone = "cone",
         Person = "person",
         Mesh = "mesh",
         Map = "map",
@@ -120,21 +121,23 @@ entry! {
     waypoints: Vec<Waypoint>, in PLACES;
     /// Of a ground: how far it lies below the lidar.
     depth_m: f64 ["m"], in LENGTH, usually NEAR_M;
-    /// Of a plane, box, sphere or cylinder: its middle, of a mesh: its file's origin, of a map: its camera, [right, down, forward] of the lidar.
+    /// Of a plane, box, sphere, cylinder or cone: its middle, of a mesh: its file's origin, of a map: its camera, [right, down, forward] of the lidar.
     centre_m: DVec3 ["m"], in POSITION, usually NEAR_M;
     /// Of a plane: any vector at right angles to it; towards the lidar if left out.
     normal: DVec3, in POSITION;
     /// Of a plane: extent along its horizontal edge.
     width_m: f64 ["m"], in LENGTH, usually NEAR_M;
-    /// Of a plane: extent along its other edge; of a cylinder: its length; of a person: 1.72 m if left out.
+    /// Of a plane: extent along its other edge; of a cylinder or cone: its length; of a person: 1.72 m if left out.
     height_m: f64 ["m"], in LENGTH, usually NEAR_M;
     /// Of a box: extents [right, down, forward] before it is turned.
     size_m: DVec3 ["m"], in LENGTH, usually NEAR_M;
     /// Of a box, person, mesh or map: its turn about the vertical axis, the front to the right; none if left out, and a person walks forward.
     yaw_deg: f64 ["deg"], in Within(-360.0, 360.0);
-    /// Of a sphere or cylinder: its radius.
+    /// Of a sphere or cylinder: its radius; of a cone: at its foot.
     radius_m: f64 ["m"], in LENGTH, usually NEAR_M;
-    /// Of a cylinder: any vector along it; upright if left out, as poles are.
+    /// Of a cone: its radius at the end that its axis points to; a tip if left out.
+    tip_radius_m: f64 ["m"], in Within(0.0, 1e6), usually NEAR_M;
+    /// Of a cylinder or cone: any vector along it, of a cone towards its tip; upright if left out, as poles are.
     axis: DVec3, in POSITION;
     /// Of a person: where it stands, [right, down, forward] of the lidar.
     foot_m: DVec3 ["m"], in POSITION, usually NEAR_M;
@@ -209,6 +212,7 @@ plain_shapes! {
     Box { centre_m, size_m, yaw_deg = 0.0 }
     Sphere { centre_m, radius_m }
     Cylinder { centre_m, axis = DVec3::NEG_Y, radius_m, height_m }
+    Cone { centre_m, axis = DVec3::NEG_Y, radius_m, tip_radius_m = 0.0, height_m }
     Person { foot_m, height_m = PERSON_M, yaw_deg = 0.0 }
 }
 

@@ -173,6 +173,13 @@ mod tests {
                 radius_m: 0.5,
                 height_m: 4.0,
             },
+            Shape::Cone {
+                centre_m: centre_m + DVec3::new(0.0, -1.0, -1.5),
+                axis: DVec3::new(0.3, -1.0, 0.2),
+                radius_m: 0.7,
+                tip_radius_m: 0.1,
+                height_m: 1.5,
+            },
             Shape::Person {
                 foot_m: centre_m,
                 height_m: 1.8,

@@ -52,7 +52,9 @@ pub(super) fn check_object(path: &str, object: &Object) -> Option<Fault> {
     };
     match object.shape {
         Shape::Plane { normal, .. } if normal.length() <= 1e-9 => return no_length("normal"),
-        Shape::Cylinder { axis, .. } if axis.length() <= 1e-9 => return no_length("axis"),
+        Shape::Cylinder { axis, .. } | Shape::Cone { axis, .. } if axis.length() <= 1e-9 => {
+            return no_length("axis");
+        }
         _ => {}
     }
     let texture = object.texture.as_ref();

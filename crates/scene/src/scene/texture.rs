@@ -44,7 +44,7 @@ pub struct Texture {
     pub shift_m: (f64, f64),
     /// By how much the surface's coordinates are turned before they are shifted, degrees.
     pub turn_deg: f64,
-    /// By how much a sphere or cylinder has been turned to the left since it got its pattern: the rig's turn to the right,
+    /// By how much a sphere, cylinder or cone has been turned to the left since it got its pattern: the rig's turn to the right,
     /// degrees. Other shapes carry their own turn.
     pub seen_turned_deg: f64,
 }

@@ -146,7 +146,7 @@ proptest! {
     /// right angles to it.
     #[test]
     fn normals_are_at_right_angles_to_the_surface(
-        x in -0.4f64..0.4, y in -0.4f64..0.4, yaw_deg in -180.0f64..180.0, kind in 0..6,
+        x in -0.4f64..0.4, y in -0.4f64..0.4, yaw_deg in -180.0f64..180.0, kind in 0..7,
     ) {
         let centre_m = DVec3::new(0.0, 0.0, 5.0);
         let shape = match kind {
@@ -155,6 +155,9 @@ proptest! {
             2 => Shape::Box { centre_m, size_m: DVec3::new(1.0, 2.0, 3.0), yaw_deg },
             3 => Shape::Sphere { centre_m, radius_m: 1.5 },
             4 => Shape::Cylinder { centre_m, axis: DVec3::new(0.2, -0.5, yaw_deg / 90.0), radius_m: 0.8, height_m: 2.0 },
+            5 => Shape::Cone {
+                centre_m, axis: DVec3::new(0.2, -0.5, yaw_deg / 90.0), radius_m: 1.2, tip_radius_m: 0.2, height_m: 2.0,
+            },
             _ => Shape::Person { foot_m: DVec3::new(0.0, 1.0, 5.0), height_m: 2.0, yaw_deg },
         };
         let scene = scene(vec![Object::new("it", 0.5, shape)]);

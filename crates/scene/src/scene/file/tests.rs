@@ -127,8 +127,8 @@ fn unknown_missing_and_misplaced_keys_are_named() {
     assert!(error.line.is_some(), "{error}");
     let (error, _) = complaint_after("radius_m = 0.12", "radius_m = 0.12\ndepth_m = 3");
     assert!(error.to_string().contains("has `depth_m`"), "{error}");
-    let (error, text) = complaint_after("kind = \"sphere\"", "kind = \"cone\"");
-    assert_eq!(error.line, line_with(&text, "\"cone\""), "{error}");
+    let (error, text) = complaint_after("kind = \"sphere\"", "kind = \"prism\"");
+    assert_eq!(error.line, line_with(&text, "\"prism\""), "{error}");
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn what_is_left_out_takes_its_default() {
 #[test]
 fn all_faults_are_told_at_once_with_their_lines() {
     let text = "[lidar]\npde = 1.5\nfov_deg = \"8 ns\"\ncolour = 1\n\
-        [light]\nilluminance_klux = nan\n[[object]]\nname = \"a\"\nkind = \"cone\"\n\
+        [light]\nilluminance_klux = nan\n[[object]]\nname = \"a\"\nkind = \"prism\"\n\
         reflectivity = -1\n[[object]]\nkind = \"sphere\"\n[weather]\n";
     let error = Scene::parse("s.toml", text).unwrap_err();
     let told = error.to_string();
@@ -164,7 +164,7 @@ fn all_faults_are_told_at_once_with_their_lines() {
         "s.toml:3: in [lidar], fov_deg = \"8 ns\" is a time; give an angle",
         "s.toml:4: in [lidar], unknown key `colour`",
         "s.toml:6: in [light], illuminance_klux = NaN is impossible; give 0 to 200 klux",
-        "s.toml:9: in [[object]] number 1 (a), kind: `cone` is impossible",
+        "s.toml:9: in [[object]] number 1 (a), kind: `prism` is impossible",
         "s.toml:10: in [[object]] number 1 (a), reflectivity = -1 is impossible",
         "s.toml:11: in [[object]] number 2, lacks `name`",
         "s.toml:13: weather: unknown section",
@@ -213,6 +213,15 @@ texture_shift_m = [0.1, 0.2]
 texture_turn_deg = 3
 second_reflectivity = 0.4
 second_grey = 0.3
+
+[[object]]
+name = "traffic cone"
+kind = "cone"
+centre_m = [1, 1, 9]
+radius_m = 0.2
+tip_radius_m = 0.03
+height_m = 0.75
+reflectivity = 0.5
 
 [[object]]
 name = "child"

@@ -55,6 +55,19 @@ pub enum Shape {
         /// Its length along the axis.
         height_m: f64,
     },
+    /// A cone with flat ends, or one flat end and a tip: traffic cones, funnels, tree tops.
+    Cone {
+        /// Middle of its axis.
+        centre_m: DVec3,
+        /// Any vector along it towards its tip, with any length but zero.
+        axis: DVec3,
+        /// Its radius at the foot.
+        radius_m: f64,
+        /// Its radius at the other end; 0 for a tip.
+        tip_radius_m: f64,
+        /// Its length along the axis.
+        height_m: f64,
+    },
     /// A walking person: head, neck, trunk, arms and legs.
     Person {
         /// Where the feet stand.
@@ -97,6 +110,7 @@ impl Shape {
             | Shape::Box { centre_m, .. }
             | Shape::Sphere { centre_m, .. }
             | Shape::Cylinder { centre_m, .. }
+            | Shape::Cone { centre_m, .. }
             | Shape::Mesh { centre_m, .. }
             | Shape::Map { centre_m, .. } => *centre_m += by_m,
             Shape::Person { foot_m, .. } => *foot_m += by_m,
@@ -124,6 +138,16 @@ impl Shape {
                 height_m,
                 ..
             } => (*centre_m, libm::hypot(*radius_m, 0.5 * height_m)),
+            Shape::Cone {
+                centre_m,
+                radius_m,
+                tip_radius_m,
+                height_m,
+                ..
+            } => {
+                let widest_m = radius_m.max(*tip_radius_m);
+                (*centre_m, libm::hypot(widest_m, 0.5 * height_m))
+            }
             Shape::Person {
                 foot_m, height_m, ..
             } => {
@@ -170,7 +194,7 @@ impl Shape {
                 *yaw_deg -= by_deg;
             }
             Shape::Sphere { centre_m, .. } => turn(centre_m),
-            Shape::Cylinder { centre_m, axis, .. } => {
+            Shape::Cylinder { centre_m, axis, .. } | Shape::Cone { centre_m, axis, .. } => {
                 turn(centre_m);
                 turn(axis);
             }

@@ -4,6 +4,7 @@
 //!   Shape ─┬─ flat:   ground, plane         placed() ─► meet(ray) ─► range, part (face, limb, triangle)
 //!          ├─ solid:  box                                normal_at(point, part)
 //!          ├─ round:  sphere, cylinder                   on_surface(point, part) ─► metres along the surface, for textures
+//!          ├─ cone                                       bend(point, part) ─► how the normal turns, for curved mirrors
 //!          ├─ person: a body of these
 //!          ├─ mesh:   triangles of a file
 //!          └─ map:    depths that a camera has seen
@@ -12,6 +13,7 @@
 //! Shapes that can be turned do their geometry in coordinates of their own ([`Pose`](pose::Pose)), worked out once for many rays
 //! ([`PlacedShape`]).
 
+mod cone;
 mod flat;
 mod kinds;
 mod map;
@@ -111,7 +113,51 @@ mod tests {
         assert_eq!(cube.intersect(&ray(1.0, 0.0, 0.0)), Some(1.0));
     }
 
+    #[test]
+    fn a_cone_ends_in_its_tip() {
+        // Its tip is up, 1 m high and 1 m wide at the foot, 10 m away.
+        let cone = Shape::Cone {
+            centre_m: DVec3::new(0.0, 0.0, 10.0),
+            axis: DVec3::NEG_Y,
+            radius_m: 0.5,
+            tip_radius_m: 0.0,
+            height_m: 1.0,
+        };
+        let range_m = cone.intersect(&ray(0.0, 0.0, 1.0)).unwrap();
+        assert!((range_m - 9.75).abs() < 1e-12, "{range_m}");
+        // Above its tip and below its foot it is not met, nor is the other half of the endless cone.
+        let level = |x, y| cone.intersect(&Ray::new(DVec3::new(x, y, 0.0), DVec3::Z));
+        assert_eq!(
+            [level(0.0, -0.51), level(0.0, 0.51), level(0.1, -0.6)],
+            [None; 3]
+        );
+        for y in [-0.49, -0.2, 0.0, 0.3, 0.49] {
+            let radius_m = 0.5 * (y + 0.5);
+            assert!((level(0.0, y).unwrap() - (10.0 - radius_m)).abs() < 1e-9);
+            assert_eq!(level(radius_m + 1e-6, y), None);
+        }
+        // From above and from below, and from inside.
+        let upright =
+            |x, y, down| cone.intersect(&Ray::new(DVec3::new(x, y, 10.0), DVec3::Y * down));
+        assert!((upright(0.2, -5.0, 1.0).unwrap() - 4.9).abs() < 1e-9);
+        assert!((upright(0.2, 5.0, -1.0).unwrap() - 4.5).abs() < 1e-9);
+        assert!((upright(0.0, 0.0, -1.0).unwrap() - 0.5).abs() < 1e-9);
+    }
+
     proptest! {
+        /// With equal radii it is a cylinder.
+        #[test]
+        fn a_cone_that_does_not_taper_is_a_cylinder(x in -1.0f64..1.0, y in -1.0f64..1.0, lean in -1.0f64..1.0) {
+            let (centre_m, axis) = (DVec3::new(0.3, -0.2, 8.0), DVec3::new(lean, -1.0, 0.4));
+            let cone = Shape::Cone { centre_m, axis, radius_m: 0.9, tip_radius_m: 0.9, height_m: 3.0 };
+            let cylinder = Shape::Cylinder { centre_m, axis, radius_m: 0.9, height_m: 3.0 };
+            let [cone, cylinder] = [cone, cylinder].map(|shape| shape.intersect(&ray(x, y, 4.0)));
+            prop_assert_eq!(cone.is_some(), cylinder.is_some());
+            if let (Some(cone), Some(cylinder)) = (cone, cylinder) {
+                prop_assert!((cone - cylinder).abs() < 1e-9);
+            }
+        }
+
         #[test]
         fn hits_of_a_sphere_lie_on_it(x in -1.0f64..1.0, y in -1.0f64..1.0, radius_m in 0.1f64..3.0) {
             let centre_m = DVec3::new(0.3, -0.2, 8.0);

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::cone::Cone;
 use super::flat::Flat;
 use super::kinds::Shape;
 use super::map::DepthMap;
@@ -33,6 +34,7 @@ pub(in crate::scene) enum PlacedShape<'a> {
         radius_m: f64,
         height_m: f64,
     },
+    Cone(Cone),
     Person {
         pose: Pose,
         height_m: f64,
@@ -91,6 +93,18 @@ impl<'a> PlacedShape<'a> {
                 radius_m,
                 height_m,
             },
+            Shape::Cone {
+                centre_m,
+                axis,
+                radius_m,
+                tip_radius_m,
+                height_m,
+            } => PlacedShape::Cone(Cone::new(
+                centre_m,
+                axis,
+                (radius_m, tip_radius_m),
+                height_m,
+            )),
             Shape::Person {
                 foot_m,
                 height_m,
@@ -135,6 +149,7 @@ impl<'a> PlacedShape<'a> {
                 radius_m,
                 height_m,
             } => round::meet_cylinder(ray, centre_m, axis, (radius_m, height_m)),
+            PlacedShape::Cone(cone) => cone.intersect(ray),
             PlacedShape::Person { pose, height_m } => {
                 person::intersect(&pose.inwards(ray), height_m)
             }
@@ -166,6 +181,7 @@ impl<'a> PlacedShape<'a> {
             PlacedShape::Cylinder { centre_m, axis, .. } => {
                 round::cylinder_normal(point - centre_m, axis, part)
             }
+            PlacedShape::Cone(cone) => cone.normal_at(point, part),
             PlacedShape::Person { pose, height_m } => {
                 pose.outwards(person::normal_at(pose.inside(point) / height_m, part))
             }
@@ -174,14 +190,15 @@ impl<'a> PlacedShape<'a> {
         }
     }
 
-    /// How that normal turns along a small step within the surface: not at all where it is flat. People and depth maps count as
+    /// How that normal turns along a small step within the surface from `point`: not at all where it is flat. People and depth maps count as
     /// made of flats.
-    pub(in crate::scene) fn bend(&self, part: u32, step_m: DVec3) -> DVec3 {
+    pub(in crate::scene) fn bend(&self, point: DVec3, part: u32, step_m: DVec3) -> DVec3 {
         match *self {
             PlacedShape::Sphere { radius_m, .. } => step_m / radius_m,
             PlacedShape::Cylinder { axis, radius_m, .. } => {
                 round::cylinder_bend(step_m, axis, radius_m, part)
             }
+            PlacedShape::Cone(cone) => cone.bend(point, part, step_m),
             _ => DVec3::ZERO,
         }
     }
@@ -214,6 +231,7 @@ impl<'a> PlacedShape<'a> {
                 let (offset, axis) = (turned_back(point - centre_m), turned_back(axis));
                 round::on_cylinder(offset, axis, radius_m, part)
             }
+            PlacedShape::Cone(cone) => cone.on_surface(point, part, turned_back),
             PlacedShape::Person { pose, .. } => {
                 // Front and back carry what hangs straight down them; no two limbs carry the same.
                 let inside = pose.inside(point);
