@@ -130,7 +130,9 @@ impl Liberty {
         if first.value("time_unit").is_none() {
             map.remarks.push(LibraryRemark::NoTimeUnit);
         }
-        let twice = passed_over.iter().filter(|cell| matches!(cell.why, PassedOverReason::Duplicate { .. }));
+        let twice = passed_over
+            .iter()
+            .filter(|cell| matches!(cell.why, PassedOverReason::Duplicate { .. }));
         let mut twice: Vec<String> = twice.map(|cell| cell.cell.clone()).collect();
         twice.sort_unstable();
         twice.dedup();

@@ -112,8 +112,15 @@ impl fmt::Display for LibraryRemark {
                 let few: Vec<&str> = cells.iter().take(3).map(String::as_str).collect();
                 let more = cells.len() - few.len();
                 let few = few.join(", ");
-                let cells = if more > 0 { format!("{few} and {more} more cells") } else { few };
-                write!(f, "{cells}: a file has such a cell more than once; the first one counts")
+                let cells = if more > 0 {
+                    format!("{few} and {more} more cells")
+                } else {
+                    few
+                };
+                write!(
+                    f,
+                    "{cells}: a file has such a cell more than once; the first one counts"
+                )
             }
         }
     }

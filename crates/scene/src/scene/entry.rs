@@ -161,8 +161,8 @@ entry! {
     principal_px: (f64, f64) ["px"], in Within(-1e6, 1e6);
 }
 
-/// The first key that not every kind of object may have.
-const FIRST_OF_SOME: &str = "depth_m";
+/// Keys that meshes have beside those of all.
+const OF_MESHES: &[&str] = &["file", "centre_m", "scale_m", "yaw_deg"];
 
 /// Keys that maps have beside those of all.
 const OF_MAPS: &[&str] = &[
@@ -180,6 +180,9 @@ const OF_MAPS: &[&str] = &[
 /// Shapes whose fields are keys of the same names, with what a field is where a file gives none: how they are read and written.
 macro_rules! plain_shapes {
     ($($kind:ident { $($key:ident $(= $usual:expr)?),+ })+) => {
+        /// Their keys beside those of all.
+        const OF_PLAIN_SHAPES: &[&str] = &[$($(stringify!($key)),+),+];
+
         impl ObjectEntry {
             fn plain_shape(&self) -> Result<Option<Shape>, String> {
                 Ok(Some(match self.kind {
@@ -224,10 +227,11 @@ impl ObjectEntry {
 
     /// Complains about keys that mean nothing for this kind of object.
     fn refuse_others(&self, allowed: &[&str]) -> Result<(), String> {
-        let of_some = Self::KEYS.iter().map(|key| key.name);
-        let of_some = of_some.skip_while(|key| *key != FIRST_OF_SOME);
-        let mut others = of_some.filter(|key| !allowed.contains(key));
-        match others.find(|key| self.given().any(|given| given == *key)) {
+        let of_some = |key: &&str| {
+            let of_some = [OF_PLAIN_SHAPES, OF_MESHES, OF_MAPS];
+            of_some.iter().any(|keys| keys.contains(key)) && !allowed.contains(key)
+        };
+        match self.given().find(of_some) {
             None => Ok(()),
             Some(key) => Err(format!(
                 "object \"{}\" has `{key}`, which its kind does not use; remove it",
@@ -261,7 +265,7 @@ impl ObjectEntry {
         }
         Ok(match self.kind {
             ObjectKind::Mesh => {
-                self.refuse_others(&["file", "centre_m", "scale_m", "yaw_deg"])?;
+                self.refuse_others(OF_MESHES)?;
                 let file = placed(folder, self.need("file", self.file.as_ref())?);
                 Shape::Mesh {
                     centre_m: self.need("centre_m", self.centre_m)?,

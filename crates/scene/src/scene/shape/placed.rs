@@ -199,7 +199,12 @@ impl<'a> PlacedShape<'a> {
                 round::cylinder_bend(step_m, axis, radius_m, part)
             }
             PlacedShape::Cone(cone) => cone.bend(point, part, step_m),
-            _ => DVec3::ZERO,
+            PlacedShape::Ground { .. }
+            | PlacedShape::Plane(_)
+            | PlacedShape::Box { .. }
+            | PlacedShape::Person { .. }
+            | PlacedShape::Mesh { .. }
+            | PlacedShape::Map { .. } => DVec3::ZERO,
         }
     }
 
