@@ -153,17 +153,6 @@ pub(super) fn run(mut args: PhotonsArgs) -> anyhow::Result<()> {
             pixels.len()
         ));
     }
-    let is_cut = |pixel: &&u32| {
-        let light = source.facts(**pixel);
-        light.signal >= MOST_PER_ECHO || light.background_hz >= MOST_BACKGROUND_HZ
-    };
-    let cut = pixels.iter().filter(is_cut).count();
-    if cut > 0 {
-        note(format_args!(
-            "{cut} of {} macropixels get more light than is modelled: it is cut to {MOST_PER_ECHO:e} photons of an echo a laser cycle, and {MOST_BACKGROUND_HZ:e} Hz of background",
-            pixels.len()
-        ));
-    }
     let bytes = options.expected_bytes(&source, &pixels);
     if bytes > LARGE_BYTES {
         note(format_args!(
@@ -192,6 +181,17 @@ pub(super) fn run(mut args: PhotonsArgs) -> anyhow::Result<()> {
     let kept = results.commit(report.configuration.clone())?;
     progress.finish_and_clear();
     notes(kept);
+    let is_cut = |pixel: &&u32| {
+        let light = source.facts(**pixel);
+        light.signal >= MOST_PER_ECHO || light.background_hz >= MOST_BACKGROUND_HZ
+    };
+    let cut = pixels.iter().filter(is_cut).count();
+    if cut > 0 {
+        note(format_args!(
+            "{cut} of {} macropixels get more light than is modelled: it is cut to {MOST_PER_ECHO:e} photons of an echo a laser cycle, and {MOST_BACKGROUND_HZ:e} Hz of background",
+            pixels.len()
+        ));
+    }
     if report.pulses_merged > 0 {
         note(format_args!(
             "{} pulses are one bit with another of their SPAD in the same word; a --word-ns of at most {} tells them apart",

@@ -56,7 +56,7 @@ scene.lidar.fov_deg = 0.8
 replicas = 4
 [vary]
 sensor.rows = [2, 3]
-sensor.dead_time_ns = [8, 0.001]
+sensor.dead_time_ns = [8, 0.6]
 sensor.spad_rows = [3, 4]
 frame.laser_cycles = { from = 20, to = 200, steps = 3, scale = \"log\" }
 scene.light.illuminance_klux = [0, 0.5]

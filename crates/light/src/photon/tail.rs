@@ -25,7 +25,7 @@ pub struct DiffusionTail {
     pub time: Time,
 }
 
-/// How wide the echo of one place is.
+/// How wide the echo of one place is, and how much of it differs from pulse to pulse and from SPAD to SPAD.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EchoWidth {
     /// Standard deviation of its Gaussian part: laser pulse and all jitter.
@@ -34,6 +34,10 @@ pub struct EchoWidth {
     pub tail: Option<DiffusionTail>,
     /// Whether a Gaussian is near enough to the rest for bounds to hold.
     pub is_gaussian: bool,
+    /// Standard deviation of a pulse's energy, relative to the mean: uniform, as in the photon stream.
+    pub energy_spread: f64,
+    /// Standard deviation of a SPAD's detection efficiency, relative to the mean.
+    pub pde_spread: f64,
 }
 
 impl From<Time> for EchoWidth {
@@ -43,6 +47,8 @@ impl From<Time> for EchoWidth {
             sigma,
             tail: None,
             is_gaussian: true,
+            energy_spread: 0.0,
+            pde_spread: 0.0,
         }
     }
 }

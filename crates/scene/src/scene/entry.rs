@@ -12,7 +12,7 @@ use super::texture::{Pattern, Picture, Texture};
 use super::words::{LENGTH, NEAR_M, PLACES, POSITION, SHARE, SPEED, SPEEDS};
 use crate::files::placed;
 use crate::settings::Range::{Above, Within};
-use crate::settings::{Settings, keys, words};
+use crate::settings::{keys, words};
 
 /// Height of a person that a file gives none, m: about the mean of adults in Europe.
 const PERSON_M: f64 = 1.72;

@@ -355,6 +355,8 @@ impl Scene {
             sigma: self.pulse_resolution(),
             tail: self.lidar.diffusion_tail(),
             is_gaussian: self.remark_on_pulse().is_none(),
+            energy_spread: self.lidar.pulse_energy_spread,
+            pde_spread: self.lidar.pde_spread,
         }
     }
 

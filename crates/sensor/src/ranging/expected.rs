@@ -12,7 +12,7 @@
 //!
 //! How a SPAD goes through a laser cycle is [`spad_state`](super::spad_state)'s.
 //!
-//! Assumed: SPADs alike ([`dead_times`](super::dead_times) says what it costs where they are not), and recovered from the echo before the next laser cycle's.
+//! Assumed: SPADs and pulses alike ([`spreads`](super::spreads) says what it costs where they are not), and recovered from the echo before the next laser cycle's.
 
 mod known_chances;
 mod other_bins;
@@ -87,8 +87,10 @@ pub struct Response {
     tail: Option<Tail>,
     pub(super) counting: Counting,
     dead: Dead,
-    /// Standard deviation of dead times, relative to their mean.
+    /// Standard deviation of dead times, relative to their mean; that of pulses' energies, and of the SPADs' detection efficiencies.
     pub(super) dead_time_spread: f64,
+    pub(super) energy_spread: f64,
+    pub(super) pde_spread: f64,
     /// Of bins that count otherwise; dead time says nothing there.
     other_bins: Option<Arc<OtherBins>>,
 }
@@ -122,6 +124,8 @@ impl Response {
                 crosstalk: config.crosstalk_probability * neighbours,
             },
             dead_time_spread: config.dead_time_spread,
+            energy_spread: pulse.energy_spread,
+            pde_spread: pulse.pde_spread,
             other_bins: None,
         }
     }
@@ -145,6 +149,8 @@ impl Response {
                 crosstalk: 0.0,
             },
             dead_time_spread: 0.0,
+            energy_spread: 0.0,
+            pde_spread: 0.0,
             other_bins: Some(Arc::new(law)),
         }
     }

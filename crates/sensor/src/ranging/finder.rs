@@ -415,7 +415,7 @@ impl EchoFinder {
         !is_inside || ends_high != [false; 2]
     }
 
-    /// What is said of an echo's place: the least that its counts allow, and what its unknown shape and unequal dead times add.
+    /// What is said of an echo's place: the least that its counts allow, and what its unknown shape, and SPADs and pulses that differ, add.
     fn bound_bins(&self, corrected: &CorrectedPeak) -> f64 {
         let Some(walk) = self.walk_correction() else {
             return corrected.bound_bins;
@@ -425,9 +425,9 @@ impl EchoFinder {
         let of_spread = OF_SHAPE + (OF_FRONT - OF_SHAPE) * share_fired;
         let spread = self.spread_bins(&corrected.light).unwrap_or(0.0);
         let bound = libm::hypot(corrected.bound_bins, of_spread * spread);
-        let of_dead_times = walk.error_of_dead_times(&corrected.light);
+        let of_spreads = walk.error_of_spreads(&corrected.light);
         // Under a THRESHOLD other lights may explain the counts from anywhere.
-        libm::hypot(bound, of_dead_times).min(walk.response.bins as f64)
+        libm::hypot(bound, of_spreads).min(walk.response.bins as f64)
     }
 
     /// Whether an echo is so strong that its counts do not tell its place.

@@ -3,7 +3,6 @@
 mod arrival;
 mod calibration;
 mod counting;
-mod dead_times;
 mod detector;
 mod expected;
 mod finder;
@@ -15,6 +14,7 @@ mod profile;
 mod pulse;
 mod returns;
 mod spad_state;
+mod spreads;
 pub mod tmf8820;
 mod walk;
 

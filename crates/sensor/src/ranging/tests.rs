@@ -23,6 +23,8 @@ const LATE: EchoWidth = EchoWidth {
         time: Time::from_ns(3),
     }),
     is_gaussian: true,
+    energy_spread: 0.0,
+    pde_spread: 0.0,
 };
 
 /// A start value, and the chip that counts with it.
