@@ -10,8 +10,8 @@ use crate::engine::{LitPixel, Window, expose, stream_config};
 use crate::photon::{DiffusionTail, EchoWidth, PhotonStream, PixelLight, PulseShape, StreamConfig};
 use crate::units::{Time, TimeOfFlight};
 
-mod dead_times;
 mod short_pulses;
+mod spreads;
 
 const PULSE_SIGMA: Time = Time::from_ps(1_911);
 
@@ -58,6 +58,7 @@ impl Bench {
     fn expose(&self, seed: u64, number: u32, light: impl Fn(u32) -> PixelLight) -> Vec<Vec<u32>> {
         let stream = StreamConfig {
             pulse_shape: self.shape(),
+            energy_spread: self.width.energy_spread,
             ..stream_config(&self.config, &self.exposure, seed, self.width.sigma)
         };
         let pixels: Vec<LitPixel> = (0..number)
