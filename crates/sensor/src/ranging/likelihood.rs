@@ -261,7 +261,8 @@ impl Likelihood<'_> {
             wanted[i] = 0.0;
             leave_out(&mut matrix, i);
         }
-        let mut step = solved(matrix, wanted)?;
+        let step = solved(matrix, wanted)?;
+        let mut step = step.iter().all(|by| by.is_finite()).then_some(step)?;
         // No farther than the slopes can be trusted: half a bin or pulse, and factors of e.
         let most = [0.5 + 0.5 * self.response.pulse_sigma_bins, 1.0, 1.5, 0.5];
         // Under a THRESHOLD bins say next to nothing of the background, which would hold back everything else.
@@ -406,6 +407,10 @@ fn missing(counts: &[f64], chances: &[f64], cycles: f64) -> f64 {
         let [counted, uncounted] = [(counts, of_counts), (missed, of_missed)]
             .map(|(part, share)| if part > 0.0 { share } else { 0.0 });
         *term = counted + uncounted;
+    }
+    // Of light beyond all measure no chance is known.
+    if chances.iter().any(|chance| chance.is_nan()) {
+        return f64::INFINITY;
     }
     terms.iter().sum()
 }

@@ -1,7 +1,8 @@
 //! Where an echo may lie, where the curvature of the likelihood does not say it.
 //!
 //! ```text
-//!   likelihood   ▁▂███████▂▁      a pulse shorter than a bin: any place within the bin explains the counts as well
+//!   likelihood   ▁▂███████▂▁      a pulse shorter than a bin, or light that fires every SPAD within a part of one: any place within the bin
+//!                                 explains the counts as well
 //!                ▁▂▇▂▁▁▁▂▅▂▁      strong light: a weaker echo here or a stronger one there
 //!                    ▲
 //!                  mean, and five bounds reach to all that is not unlikely

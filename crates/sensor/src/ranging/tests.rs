@@ -296,7 +296,9 @@ fn assert_right_with(
     let errors = errors(config, [width; 2], cycles, signal, number);
     let n = errors.without_reason as f64;
     let case = format!("{signal} photons: {errors:?}, {config:?}");
-    assert!(n > 0.95 * f64::from(number), "{case}");
+    // Of strong light some counts tell the bin alone.
+    let least = if signal < 500.0 { 0.95 } else { 0.9 };
+    assert!(n > least * f64::from(number), "{case}");
     // Three standard deviations of the mean of `n` errors, and of their root mean square.
     assert!(
         errors.mean.abs() < 3.0 + 3.0 * errors.rms / n.sqrt(),

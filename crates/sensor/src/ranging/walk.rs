@@ -33,6 +33,10 @@ mod many_starts;
 /// THRESHOLD six were fitted more than half a bound beside without, and one is with it.
 const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 
+/// Photons on a SPAD in a laser cycle from which on its first one tells the place: chosen. Of 256 depths of a sign with 156 of them in bright sun, 17 and 19 %
+/// were beyond five bounds of the likelihood's curvature at two of three distances.
+const SHARP: f64 = 20.0;
+
 /// Standard deviation with which a deep echo is sought, bins: chosen.
 const DEEP_BINS: f64 = 2.5;
 
@@ -193,6 +197,12 @@ impl WalkCorrection {
         self.has_short_pulses() && fit.light.sigma_bins < SHORT
     }
 
+    /// Whether light is so strong that SPADs fire within a short part of its edge.
+    fn is_sharp(&self, fit: &Fit) -> bool {
+        let counting = self.response.counting;
+        counting.threshold == 0 && fit.light.signal > SHARP * counting.spads as f64
+    }
+
     /// What is told of the lights that explain the counts, the most likely first.
     ///
     /// # Errors
@@ -203,12 +213,21 @@ impl WalkCorrection {
         fits: &[Fit],
     ) -> Result<CorrectedPeak, WalkLeft> {
         let widened = self.widened(wide, fits[0])?;
-        let told = if self.is_short(&fits[0]) {
-            averaged(wide, fits, &widened)
-        } else {
-            widened
-        };
-        Ok(told.into())
+        if self.is_short(&fits[0]) {
+            return Ok(averaged(wide, fits, &widened).into());
+        }
+        if !self.is_sharp(&fits[0]) {
+            return Ok(widened.into());
+        }
+        // The most likely place is less off on average than the mean of all, and its curvature says too little.
+        let mean = averaged(wide, fits, &widened);
+        let off = mean.light.position_bins - widened.light.position_bins;
+        let bound_bins = libm::hypot(mean.bound_bins, off).max(widened.bound_bins);
+        Ok(Fit {
+            bound_bins,
+            ..widened
+        }
+        .into())
     }
 
     /// The same echo with its own width, where its counts ask for one. Of a deep surface with few counts a bin, the pulse alone finds the
