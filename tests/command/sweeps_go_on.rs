@@ -20,7 +20,9 @@ fn done(folder: &Path, threads: usize, arguments: &[&str]) -> String {
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
     // Nobody looks at progress that is piped.
-    assert_eq!(text(&output.stderr), "");
+    let said = text(&output.stderr);
+    let is_note = |line: &str| line.contains("is far from the usual");
+    assert!(said.lines().all(is_note), "{said}");
     text(&output.stdout)
 }
 
@@ -56,7 +58,7 @@ scene.lidar.fov_deg = 0.8
 replicas = 4
 [vary]
 sensor.rows = [2, 3]
-sensor.dead_time_ns = [8, 0.6]
+sensor.dead_time_ns = [8, 0.001]
 sensor.spad_rows = [3, 4]
 frame.laser_cycles = { from = 20, to = 200, steps = 3, scale = \"log\" }
 scene.light.illuminance_klux = [0, 0.5]
