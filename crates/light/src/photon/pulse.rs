@@ -110,7 +110,7 @@ impl PulseShape {
         let variance = own + sigma * sigma;
         let cumulants = (third / total, fourth / total - 3.0 * own * own);
         (
-            cumulants.0 / variance.powf(1.5),
+            cumulants.0 / (variance * variance.sqrt()),
             cumulants.1 / (variance * variance),
         )
     }
