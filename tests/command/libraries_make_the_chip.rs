@@ -310,3 +310,32 @@ fn what_a_library_leaves_out_is_told() {
         assert!(said.contains(says), "{says}: {said}");
     }
 }
+
+/// Of a library nobody says how its delays move with voltage and temperature.
+#[test]
+fn timing_names_all_clocks_and_no_conditions_of_a_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = example();
+    for (arguments, conditions) in [
+        (&["timing", "--json"][..], 3),
+        (&["timing", "--json", "--liberty", &library], 0),
+    ] {
+        let output = gdtof(folder.path(), arguments);
+        let timing: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(timing["corners"].as_array().unwrap().len(), conditions);
+        let ranges = timing["clk_ranges"].as_array().unwrap();
+        assert!(
+            ranges.len() > 1 && ranges[0]["from_mhz"].is_null(),
+            "{ranges:?}"
+        );
+        let ends = ranges
+            .iter()
+            .flat_map(|range| [&range["from_mhz"], &range["to_mhz"]]);
+        let ends: Vec<f64> = ends.filter_map(serde_json::Value::as_f64).collect();
+        assert!(ends.is_sorted(), "{ends:?}");
+        assert!(
+            ranges.iter().all(|range| range["check"].is_string()),
+            "{ranges:?}"
+        );
+    }
+}

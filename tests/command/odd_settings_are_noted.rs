@@ -60,6 +60,18 @@ fn values_in_another_unit_are_told_with_that_unit() {
             "if you mean 3450 nm, give 3.45 um",
         ),
         (
+            "scene --set scene.lidar.wavelength_nm=905 --set scene.lidar.filter=gaussian --set scene.lidar.filter_fwhm_nm=40",
+            "passes less than half of its light; give filter_centre_nm = 905",
+        ),
+        (
+            "scene --set scene.lidar.pulse=[[0,1],[4,1]] --set scene.lidar.pulse_fwhm_ns=0.3",
+            "pulse is far from a Gaussian (skewness 0.00, excess kurtosis -1.1",
+        ),
+        (
+            "photons --rows 1 --cols 1 --laser-cycles 2",
+            "1 of 1 macropixels get more light than is modelled",
+        ),
+        (
             "sensor --set sensor.dead_time_ns=8000",
             "if you mean 8000 ps, give 8 ns",
         ),

@@ -90,6 +90,7 @@ fn a_counter_that_is_not_binary_gets_its_codes_and_the_law_of_the_others() {
         state = (state << 1 & 511) | u16::from(state >> 8 & 1 == state >> 4 & 1);
     }
     assert_eq!((law.code(511), state), (511, 0), "it stays where it is");
+    assert_eq!(law.silent_in_words().unwrap(), "511 (1 of 512)");
     let random = &mut StdRng::seed_from_u64(7);
     for mode in Mode::ALL {
         let config = SensorConfig {

@@ -330,7 +330,9 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
     ]);
     section.push([
         "COUNTER_INIT that never raise LOCAL_STOP".into(),
-        law.silent().unwrap_or_else(|| "none".to_owned()).into(),
+        law.silent_in_words()
+            .unwrap_or_else(|| "none".to_owned())
+            .into(),
         "none".into(),
     ]);
     Some(section)

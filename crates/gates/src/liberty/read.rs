@@ -127,7 +127,10 @@ impl Liberty {
         if conditions[0].is_none() {
             map.remarks.push(LibraryRemark::NoSupply);
         }
-        if first.value("time_unit").is_none() {
+        if groups
+            .iter()
+            .any(|group| group.value("time_unit").is_none())
+        {
             map.remarks.push(LibraryRemark::NoTimeUnit);
         }
         let twice = passed_over

@@ -96,12 +96,7 @@ impl fmt::Display for LibraryRemark {
                     "{kind} is made of {cell}, which the library says not to use: {no_other}"
                 )
             }
-            LibraryRemark::Cells { remark, cells } => match cells.as_slice() {
-                [first, _, _, _, ..] => {
-                    remark.write(f, &format!("{first} and {} more cells", cells.len() - 1))
-                }
-                few => remark.write(f, &few.join(", ")),
-            },
+            LibraryRemark::Cells { remark, cells } => remark.write(f, &few_names(cells)),
             LibraryRemark::NoSupply => f.write_str(
                 "no supply (nom_voltage) is stated; energies of loads are those at an assumed one",
             ),
@@ -109,20 +104,21 @@ impl fmt::Display for LibraryRemark {
                 f.write_str("no time_unit is stated; times are taken for nanoseconds")
             }
             LibraryRemark::Duplicates { cells } => {
-                let few: Vec<&str> = cells.iter().take(3).map(String::as_str).collect();
-                let more = cells.len() - few.len();
-                let few = few.join(", ");
-                let cells = if more > 0 {
-                    format!("{few} and {more} more cells")
-                } else {
-                    few
-                };
+                let cells = few_names(cells);
                 write!(
                     f,
                     "{cells}: a file has such a cell more than once; the first one counts"
                 )
             }
         }
+    }
+}
+
+/// Up to three names, or the first one and how many more there are.
+fn few_names(cells: &[String]) -> String {
+    match cells {
+        [first, _, _, _, ..] => format!("{first} and {} more cells", cells.len() - 1),
+        few => few.join(", "),
     }
 }
 

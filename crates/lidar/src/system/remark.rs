@@ -155,7 +155,7 @@ impl Circumstances<'_> {
         let (bits, periods) = (self.sensor.counter_bits, self.exposure.stop_periods);
         let law = self.sensor.counter_law();
         let silent = law.filter(|law| law.silent_codes().len() > 1);
-        let cure = match silent.and_then(|law| law.silent()) {
+        let cure = match silent.and_then(|law| law.silent_in_words()) {
             Some(codes) => format!(
                 "its P-counter never raises LOCAL_STOP with COUNTER_INIT {codes}; give one that does"
             ),

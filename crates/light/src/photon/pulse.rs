@@ -337,4 +337,25 @@ mod tests {
         let still = PulseShape::new(Time::ZERO, &[1.0, 1.0]);
         assert_eq!(still, Err(PulseError::Step));
     }
+
+    #[test]
+    fn skewness_and_kurtosis_are_those_of_known_shapes() {
+        let shape = |samples: &[f64]| PulseShape::new(Time::from_ns(1), samples).unwrap();
+        let rises_at_once = 2.0 * 2f64.sqrt() / 5.0;
+        for (samples, skewness, kurtosis) in [
+            (&[1.0, 1.0][..], 0.0, -1.2),
+            (&[0.0, 1.0, 0.0], 0.0, -0.6),
+            (&[1.0, 0.0], rises_at_once, -0.6),
+        ] {
+            let shape = shape(samples);
+            let found = shape.skewness_and_kurtosis(Time::ZERO);
+            assert!((found.0 - skewness).abs() < 1e-9, "{samples:?}: {found:?}");
+            assert!((found.1 - kurtosis).abs() < 1e-9, "{samples:?}: {found:?}");
+            // A Gaussian as wide as the pulse itself doubles the variance.
+            let sigma = Time::from_fs(shape.variance_fs2().sqrt().round() as i64);
+            let wider = shape.skewness_and_kurtosis(sigma);
+            assert!((wider.0 - skewness / 8f64.sqrt()).abs() < 1e-6, "{wider:?}");
+            assert!((wider.1 - kurtosis / 4.0).abs() < 1e-6, "{wider:?}");
+        }
+    }
 }

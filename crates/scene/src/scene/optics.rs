@@ -354,20 +354,26 @@ impl Scene {
         EchoWidth {
             sigma: self.pulse_resolution(),
             tail: self.lidar.diffusion_tail(),
-            is_gaussian: self.remark_on_pulse().is_none(),
+            is_gaussian: self.skewness_and_kurtosis().is_none(),
             energy_spread: self.lidar.pulse_energy_spread,
             pde_spread: self.lidar.pde_spread,
         }
     }
 
-    /// What follows from a measured pulse that is no Gaussian.
-    pub(super) fn remark_on_pulse(&self) -> Option<String> {
+    /// Those of a measured pulse that is far from a Gaussian.
+    fn skewness_and_kurtosis(&self) -> Option<(f64, f64)> {
         let pulse = self.measured_pulse()?;
         let (skewness, kurtosis) = pulse.skewness_and_kurtosis(self.pulse_sigma());
-        let is_gaussian = skewness.abs() <= MOST_SKEWNESS && kurtosis.abs() <= MOST_KURTOSIS;
-        (!is_gaussian).then(|| {
-            format!("in [lidar], pulse is far from a Gaussian (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}); depths are centres of mass without a bound")
-        })
+        let is_near = skewness.abs() <= MOST_SKEWNESS && kurtosis.abs() <= MOST_KURTOSIS;
+        (!is_near).then_some((skewness, kurtosis))
+    }
+
+    /// What follows from such a pulse.
+    pub(super) fn remark_on_pulse(&self) -> Option<String> {
+        let (skewness, kurtosis) = self.skewness_and_kurtosis()?;
+        Some(format!(
+            "in [lidar], pulse is far from a Gaussian (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}); depths are centres of mass without a bound"
+        ))
     }
 
     /// A photon stream with the measured laser pulse, if there is one, and the spread of its energy.

@@ -272,7 +272,7 @@ impl SensorConfig {
     /// Sentences on values that are probably in another unit than their key has, and on start values that a P-counter of one's own does not serve.
     pub fn remarks(&self) -> Vec<String> {
         let of_units = remarks(&[Self::SECTION], &self.table());
-        let silent = self.counter_law().and_then(|law| law.silent());
+        let silent = self.counter_law().and_then(|law| law.silent_in_words());
         let silent = silent.map(|codes| {
             format!("its P-counter never raises LOCAL_STOP with COUNTER_INIT {codes}; no window opens from these")
         });

@@ -160,7 +160,7 @@ impl<'a> PixelStream<'a> {
     /// Mean number of photons of a SPAD within a time after the start of a laser cycle, averaged over the exposure. Those of an ordered echo, and of other
     /// lasers, are left out; a measured pulse is taken for even.
     pub fn photons_within(&self, within_fs: &Range<i64>) -> f64 {
-        let cycle_fs = self.stream.cycle_fs;
+        let cycle_fs = self.stream.cycle_fs();
         let profile = self.limits.as_ref().and_then(|l| l.profile.as_ref());
         let background = match profile {
             None => (within_fs.end - within_fs.start) as f64 / self.gap_fs,
@@ -197,7 +197,7 @@ impl<'a> PixelStream<'a> {
     /// beginning of the exposure, for each window.
     pub fn has_ordered_echo(&self) -> bool {
         let is_gaussian = self.shape.is_none();
-        let is_short = self.echo_fs.1 - self.echo_fs.0 < self.stream.cycle_fs / 2;
+        let is_short = self.echo_fs.1 - self.echo_fs.0 < self.stream.cycle_fs() / 2;
         let is_plain = self.kind == PhotonKind::Plain;
         let is_drawn_so = self.is_bright && self.is_alone && is_plain;
         is_drawn_so && is_gaussian && is_short && self.signal_per_spad > 0.0

@@ -35,8 +35,6 @@ pub struct PhotonStream {
     pub(super) config: StreamConfig,
     pub(super) key: [u32; 2],
     laser_cycles: LaserCycles,
-    /// The whole femtoseconds of a laser cycle.
-    pub cycle_fs: i64,
     /// Slots of a laser cycle.
     pub slots: Slots,
     pub(super) gaussian: NormalSampler,
@@ -49,15 +47,13 @@ impl PhotonStream {
     /// Prepares the stream.
     pub fn new(config: &StreamConfig) -> Self {
         debug_assert!(config.stop_periods > 0, "a cycle needs a length");
-        let whole_fs = config.clock.whole_fs(i64::from(config.stop_periods));
         PhotonStream {
             key: philox_key(config.seed),
             laser_cycles: LaserCycles {
                 number: config.laser_cycles,
-                whole_fs,
+                whole_fs: config.clock.whole_fs(i64::from(config.stop_periods)),
                 starts: config.clock.every(config.stop_periods),
             },
-            cycle_fs: whole_fs,
             slots: Slots::new(config.clock, config.stop_periods, config.lead),
             gaussian: NormalSampler::new(config.pulse_sigma.as_fs() as f64),
             shape: config.pulse_shape.as_ref().map(sampler),
@@ -93,6 +89,12 @@ impl PhotonStream {
         self.config.spads.grid.spads()
     }
 
+    /// The whole femtoseconds of a laser cycle.
+    #[inline]
+    pub fn cycle_fs(&self) -> i64 {
+        self.laser_cycles.whole_fs
+    }
+
     /// Start of laser cycle `cycle`, exact to the femtosecond.
     #[inline]
     pub fn cycle_start(&self, cycle: u32) -> Time {
@@ -101,7 +103,7 @@ impl PhotonStream {
 
     /// When the photons of a cycle begin and end, fs after its start.
     pub fn ends_fs(&self) -> Range<i64> {
-        -self.slots.lead_fs..self.cycle_fs - self.slots.lead_fs
+        -self.slots.lead_fs..self.cycle_fs() - self.slots.lead_fs
     }
 
     /// What these slots are. Of the cycle's own echo, all that comes before the cycle begins with the first slot, and all

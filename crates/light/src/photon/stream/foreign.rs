@@ -60,9 +60,9 @@ impl PhotonStream {
                 .ceil() as i64;
             let mut seen = Vec::new();
             // As the laser cycle itself has them, and the one before.
-            for moved_fs in [0, self.cycle_fs] {
+            for moved_fs in [0, self.cycle_fs()] {
                 let from_fs = within_fs.start + moved_fs - reach_fs;
-                let until_fs = (within_fs.end + moved_fs + reach_fs).min(self.cycle_fs + 2);
+                let until_fs = (within_fs.end + moved_fs + reach_fs).min(self.cycle_fs() + 2);
                 if from_fs < until_fs {
                     let pulses = schedule.arriving_within(from_fs.max(0)..until_fs, delay_fs);
                     seen.extend(pulses);

@@ -237,7 +237,7 @@ impl PixelStream<'_> {
 
     /// Laser cycles, relative to one of them, whose echoes may have photons `within_fs` after its start.
     pub fn echoes_within(&self, within_fs: &Range<i64>) -> Range<i64> {
-        let (echo_fs, cycle_fs) = (self.echo_fs(), self.stream.cycle_fs);
+        let (echo_fs, cycle_fs) = (self.echo_fs(), self.stream.cycle_fs());
         if echo_fs.is_empty() || within_fs.is_empty() {
             return 0..0;
         }
@@ -390,7 +390,7 @@ impl PixelStream<'_> {
     pub(super) fn greatest_share(&self, within_fs: &Range<i64>) -> f64 {
         let limits = self.limits.as_ref();
         limits.map_or(1.0, |limits| {
-            limits.greatest_share(within_fs, self.stream.cycle_fs)
+            limits.greatest_share(within_fs, self.stream.cycle_fs())
         })
     }
 

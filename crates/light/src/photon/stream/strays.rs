@@ -37,7 +37,7 @@ impl PixelStream<'_> {
         let reach_fs = self.gaussian.reach().ceil() as i64;
         let within_fs =
             all.start_fs(slots.start) - reach_fs..all.start_fs(slots.end) + reach_fs + 2;
-        let cycle_fs = stream.cycle_fs;
+        let cycle_fs = stream.cycle_fs();
         // A pulse near the end of a laser cycle has photons in the next one, and the other way round.
         let wraps = [0, cycle_fs, -cycle_fs].into_iter().filter(|moved_fs| {
             let moved = within_fs.start + moved_fs..within_fs.end + moved_fs;

@@ -9,12 +9,9 @@
 
 use glam::DVec3;
 
-use super::meeting::{Meeting, in_front};
+use super::meeting::Meeting;
+use super::round::{SIDE, between_ends};
 use crate::scene::vector::Ray;
-
-/// The parts of a cone.
-const SIDE: u32 = 0;
-const END: u32 = 1;
 
 /// A cone where it stands.
 #[derive(Debug, Clone, Copy)]
@@ -86,36 +83,8 @@ impl Cone {
     }
 
     pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
-        let (enter, leave) = self.inside_side(ray)?;
-        let start_m = (ray.origin - self.centre_m).dot(self.axis);
-        let rise = ray.direction.dot(self.axis);
-        let (low, high) = if rise == 0.0 {
-            if start_m.abs() > self.half_m {
-                return None;
-            }
-            (f64::NEG_INFINITY, f64::INFINITY)
-        } else {
-            let (a, b) = (
-                (-self.half_m - start_m) / rise,
-                (self.half_m - start_m) / rise,
-            );
-            (a.min(b), a.max(b))
-        };
-        let first = if low > enter {
-            (low, END)
-        } else {
-            (enter, SIDE)
-        };
-        let last = if high < leave {
-            (high, END)
-        } else {
-            (leave, SIDE)
-        };
-        if first.0 > last.0 {
-            return None;
-        }
-        let meeting = |(range_m, part)| in_front(range_m).map(|range_m| Meeting { range_m, part });
-        meeting(first).or_else(|| meeting(last))
+        let inside = self.inside_side(ray)?;
+        between_ends(ray, (self.centre_m, self.axis), self.half_m, inside)
     }
 
     pub(super) fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {

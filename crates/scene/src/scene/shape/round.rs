@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::meeting::{Meeting, in_front};
 use crate::scene::vector::Ray;
 
-/// The parts of a cylinder.
-const SIDE: u32 = 0;
+/// The parts of a cylinder, or of a cone.
+pub(super) const SIDE: u32 = 0;
 const END: u32 = 1;
 
 pub(super) fn meet_sphere(ray: &Ray, centre_m: DVec3, radius_m: f64) -> Option<Meeting> {
@@ -49,9 +49,19 @@ pub(super) fn meet_cylinder(
     axis: DVec3,
     (radius_m, height_m): (f64, f64),
 ) -> Option<Meeting> {
-    let (enter, leave) = pierced(ray, centre_m, axis, radius_m)?;
+    let inside = pierced(ray, centre_m, axis, radius_m)?;
+    between_ends(ray, (centre_m, axis), height_m / 2.0, inside)
+}
+
+/// Where a ray meets what lies within an endless side, from `enter` to `leave` along the ray, and between two flat ends, `half_m` either way along
+/// the axis (of unit length).
+pub(super) fn between_ends(
+    ray: &Ray,
+    (centre_m, axis): (DVec3, DVec3),
+    half_m: f64,
+    (enter, leave): (f64, f64),
+) -> Option<Meeting> {
     let (start, rise) = ((ray.origin - centre_m).dot(axis), ray.direction.dot(axis));
-    let half_m = height_m / 2.0;
     let (low, high) = if rise == 0.0 {
         if start.abs() > half_m {
             return None;

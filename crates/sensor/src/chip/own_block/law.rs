@@ -114,42 +114,20 @@ impl CounterLaw {
 
     /// Codes from which LOCAL_STOP never rises, in order; none where nothing is known ([`CounterLaw::uneven`]).
     pub fn silent_codes(&self) -> Vec<u16> {
+        if self.uneven.is_some() {
+            return Vec::new();
+        }
         let silent = |(_, of): &(&u16, &CountDownResult)| of.rises[0].is_none() && !of.starts_high;
         let by_start = self.codes.iter().zip(&self.counted);
         let mut codes: Vec<u16> = by_start.filter(silent).map(|(&code, _)| code).collect();
-        if self.uneven.is_some() {
-            codes.clear();
-        }
         codes.sort_unstable();
         codes
     }
 
     /// These codes in words, as `16 to 511 (496 of 512)`; `None` where there are none.
-    pub fn silent(&self) -> Option<String> {
+    pub fn silent_in_words(&self) -> Option<String> {
         let codes = self.silent_codes();
-        let mut ranges: Vec<[u16; 2]> = Vec::new();
-        for &code in &codes {
-            match ranges.last_mut() {
-                Some([_, last]) if *last + 1 == code => *last = code,
-                _ => ranges.push([code; 2]),
-            }
-        }
-        let range = |[first, last]: &[u16; 2]| {
-            if first == last {
-                first.to_string()
-            } else {
-                format!("{first} to {last}")
-            }
-        };
-        let mut said: Vec<String> = ranges.iter().take(MOST_RANGES).map(range).collect();
-        if ranges.len() > MOST_RANGES {
-            said.push("others".to_owned());
-        }
-        let (last, others) = said.split_last()?;
-        let said = match others {
-            [] => last.clone(),
-            _ => format!("{} and {last}", others.join(", ")),
-        };
+        let said = in_ranges(&codes)?;
         Some(format!("{said} ({} of {})", codes.len(), self.codes.len()))
     }
 
@@ -191,6 +169,33 @@ impl CounterLaw {
             },
         }
     }
+}
+
+/// Rising codes in words, as `3, 5 and 16 to 511`; `None` where there are none.
+fn in_ranges(codes: &[u16]) -> Option<String> {
+    let mut ranges: Vec<[u16; 2]> = Vec::new();
+    for &code in codes {
+        match ranges.last_mut() {
+            Some([_, last]) if *last + 1 == code => *last = code,
+            _ => ranges.push([code; 2]),
+        }
+    }
+    let range = |[first, last]: &[u16; 2]| {
+        if first == last {
+            first.to_string()
+        } else {
+            format!("{first} to {last}")
+        }
+    };
+    let mut said: Vec<String> = ranges.iter().take(MOST_RANGES).map(range).collect();
+    if ranges.len() > MOST_RANGES {
+        said.push("others".to_owned());
+    }
+    let (last, others) = said.split_last()?;
+    Some(match others {
+        [] => last.clone(),
+        _ => format!("{} and {last}", others.join(", ")),
+    })
 }
 
 /// The codes by start value, and the offset, of a line through the edges of all codes that raise LOCAL_STOP.
@@ -276,5 +281,14 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn codes_are_said_in_ranges() {
+        let said = |codes: &[u16]| in_ranges(codes).unwrap_or_default();
+        assert_eq!(said(&[]), "");
+        assert_eq!(said(&[511]), "511");
+        assert_eq!(said(&[3, 5, 6, 7]), "3 and 5 to 7");
+        assert_eq!(said(&[0, 1, 3, 5, 6, 9]), "0 to 1, 3, 5 to 6 and others");
     }
 }

@@ -242,7 +242,7 @@ impl<'a> Counting<'a> {
     ) -> (Vec<i64>, EngineWork) {
         let light = &parts[0];
         let triggering = parts.get(TRIGGERING).filter(|_| light.is_alone);
-        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs];
+        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
         let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
         let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
         let has_marks = self.stream.spads() == SPADS;

@@ -37,7 +37,7 @@ impl Spans {
     /// From `from_fs` until `until_fs`, times after the start of the window's cycle; `None` where that does not fit into
     /// the cycle and the one before.
     fn new(stream: &PhotonStream, from_fs: i64, until_fs: i64) -> Option<Self> {
-        let (cycle_fs, all, ends) = (stream.cycle_fs, stream.slots, stream.ends_fs());
+        let (cycle_fs, all, ends) = (stream.cycle_fs(), stream.slots, stream.ends_fs());
         if from_fs <= ends.start - cycle_fs || until_fs >= ends.end {
             return None;
         }
@@ -168,7 +168,7 @@ impl Sight {
         } else if !law.has_clk_bins() {
             return None;
         }
-        if end_fs - first_fs > stream.cycle_fs {
+        if end_fs - first_fs > stream.cycle_fs() {
             // A pulse in two windows would be judged twice.
             return None;
         }

@@ -117,6 +117,17 @@ fn what_keeps_range_walk_in_is_named() {
     assert_eq!(walk_left(&default(), 520), None);
     assert_eq!(walk_left(&joined, 520), Some(WalkLeft::JoinedSpads));
     assert_eq!(walk_left(&default(), 18), Some(WalkLeft::ShortLaserCycle));
+    let law = WindowLaw::new(default(), &Exposure::new(&default(), 520, 1000));
+    let measured = EchoWidth {
+        is_gaussian: false,
+        ..PULSE_SIGMA.into()
+    };
+    let found = EchoFinder::new(&law, measured, &DepthOptions::default()).unwrap();
+    let found = found.find(&counts).unwrap();
+    assert_eq!(
+        (found.walk_left, found.bound_bins),
+        (Some(WalkLeft::PulseShape), None)
+    );
     let sensor = hslidar_delay_line();
     let mut counts = [20u32; 8];
     counts[3..5].copy_from_slice(&[300, 200]);

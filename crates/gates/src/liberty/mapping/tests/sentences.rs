@@ -200,3 +200,25 @@ fn what_is_missing_or_not_used_is_told() {
     let told = sentences(&map).join("\n");
     assert!(!told.contains("leakage"), "{told}");
 }
+
+#[test]
+fn what_a_library_leaves_unstated_or_says_twice_is_told() {
+    let twice = enough_cells() + &gate_text("INV_1", 4.0, &["A"], "!A");
+    let said = sentences(&map(&twice, &[]).unwrap());
+    assert!(
+        said.iter()
+            .any(|said| said.contains("no time_unit is stated")),
+        "{said:?}"
+    );
+    assert!(
+        said.iter()
+            .any(|said| said.starts_with("INV_1: a file has such a cell")),
+        "{said:?}"
+    );
+    let text = HEAD.replace("{ cap", "{ time_unit : \"1ns\"; cap") + &enough_cells() + "}";
+    let said = sentences(&Liberty::read(&text, &[]).unwrap().map).concat();
+    assert!(
+        !said.contains("time_unit") && !said.contains("more than once"),
+        "{said}"
+    );
+}

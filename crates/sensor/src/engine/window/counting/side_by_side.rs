@@ -102,7 +102,7 @@ impl Counting<'_> {
             let mut background = light.background(
                 first_other,
                 block,
-                layout.until_fs - relative * self.stream.cycle_fs + ROUNDING_FS,
+                layout.until_fs - relative * self.stream.cycle_fs() + ROUNDING_FS,
             );
             let end_fs = background.end_fs();
             let moved_fs: [i64; TILE] = std::array::from_fn(|lane| {

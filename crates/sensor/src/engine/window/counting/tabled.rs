@@ -102,7 +102,7 @@ impl Tabling<'_> {
         kept: &mut TableScratch,
     ) {
         let (slots, places) = (light.slots(), self.places(later));
-        let moved_fs = i64::from(later) * counting.stream.cycle_fs;
+        let moved_fs = i64::from(later) * counting.stream.cycle_fs();
         let room_fs = ROUNDING_FS + 2 * i64::from(later);
         for run in draw.runs.iter().filter(|run| run.photons > 0) {
             let time_fs = |step: u32| slots.time_fs(run.slot, step) - moved_fs;
@@ -399,7 +399,7 @@ impl Counting<'_> {
         if group.first_cycle() == 0 {
             // Some may come before the exposure and be no photons.
             let from_fs = pixel.sight.plain.from_fs - ROUNDING_FS;
-            let early = u32::from(from_fs <= 0) + u32::from(from_fs + self.stream.cycle_fs <= 0);
+            let early = u32::from(from_fs <= 0) + u32::from(from_fs + self.stream.cycle_fs() <= 0);
             let places = 0..(early << tabling.spad_bits).min(tabling.end);
             places.for_each(|place| kept.table.doubt_place(place));
         }

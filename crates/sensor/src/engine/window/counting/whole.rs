@@ -85,7 +85,7 @@ impl Counting<'_> {
                 continue;
             }
             // The window's time in that of the echo's cycle, with room for rounding.
-            let moved_fs = later * self.stream.cycle_fs;
+            let moved_fs = later * self.stream.cycle_fs();
             let room_fs = ROUNDING_FS + later.abs();
             let span = Span {
                 slots: 0..0,
