@@ -71,7 +71,7 @@ impl Scene {
     ) -> PyResult<Self> {
         let sources = Sources {
             scene: source,
-            set: assignments("scene.", keys)?,
+            set: assignments("scene.", "Scene", keys)?,
             ..Sources::default()
         };
         let (_, world) = sources.read().map_err(Failure::from)?;

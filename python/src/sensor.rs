@@ -59,7 +59,7 @@ impl Sensor {
     ) -> PyResult<Self> {
         let sources = Sources {
             sensor: source,
-            set: assignments("sensor.", keys)?,
+            set: assignments("sensor.", "Sensor", keys)?,
             ..Sources::default()
         };
         Self::given(py, sources.read_sensor().map_err(Failure::from)?)

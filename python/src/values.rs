@@ -4,7 +4,7 @@ use std::ffi::CString;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use guided_dtof::files::in_plain_words;
-use guided_dtof::settings::{Document, said_remarks};
+use guided_dtof::settings::{Assignment, Document, said_remarks};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
@@ -183,14 +183,19 @@ pub(crate) fn by_json<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<
     py.import("json")?.call_method1("loads", (text,))
 }
 
-/// Settings as the command line's `--set` takes them, each with the first name `of`.
+/// The settings in a dict, of the section `of` if that is not empty; `place` is the call, in which errors are reported.
 ///
 /// # Errors
-/// Values that are none.
-pub(crate) fn assignments(prefix: &str, dict: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
+/// Values and keys that are none.
+pub(crate) fn assignments(
+    of: &str,
+    place: &str,
+    dict: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Vec<Assignment>> {
     let assignment = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
-        let key: String = key.extract()?;
-        Ok(format!("{prefix}{key}={}", to_toml(&value)?))
+        let (key, value): (String, _) = (key.extract()?, to_toml(&value)?);
+        let origin = format!("{place}({key}={value})");
+        Ok(Assignment::new(&format!("{of}{key}"), value, origin).map_err(Failure::from)?)
     };
     dict.into_iter().flatten().map(assignment).collect()
 }
@@ -205,11 +210,8 @@ pub(crate) fn reassigned(
     keys: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Document> {
     let mut document = Document::from_table(name, table);
-    for assignment in assignments("", keys)? {
-        let place = format!("with_({assignment})");
-        document
-            .assign(&assignment, &place)
-            .map_err(Failure::from)?;
+    for assignment in assignments("", "with_", keys)? {
+        document.assign(&assignment).map_err(Failure::from)?;
     }
     Ok(document)
 }

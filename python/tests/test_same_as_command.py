@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -167,8 +168,10 @@ def test_sentences(command: Command, tmp_path: Path, options: tuple[Any, ...], a
         ask()
     # The command line writes its options as such.
     names = {"--laser-cycles": "laser_cycles", "--false-alarm-rate": "false_alarm_rate", "--guide": "guide"}
-    names |= {"--set ": "set ", "--windows": "windows", "--engine window": 'engine = "window"'}
+    names |= {"--windows": "windows", "--engine window": 'engine = "window"'}
     said = said.removeprefix("gdtof: ").removeprefix("error: ")
     for option, key in names.items():
         said = said.replace(option, key)
+    # Python says in which call a key stands.
+    said = re.sub(r"^--set (sensor|scene)\.(.*?): ", lambda found: f"{found[1].title()}({found[2]}): ", said)
     assert str(raised.value) == said

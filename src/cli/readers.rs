@@ -9,8 +9,8 @@ use toml::Table;
 use super::frame::calibration;
 use crate::chip::{Exposure, SensorConfig, Silicon, hslidar_delay_line, macropixel};
 use crate::files::{
-    Journal, JournalReader, MANIFEST, Raster, ResultSet, journal_line, parse_json, read_counts,
-    read_text, write_npy,
+    InputError, Journal, JournalReader, MANIFEST, Raster, ResultSet, journal_line, parse_json,
+    read_counts, read_text, write_npy,
 };
 use crate::guide::options;
 use crate::liberty::Liberty;
@@ -20,7 +20,7 @@ use crate::ranging::{Calibration, tmf8820};
 use crate::request::read_calibration;
 use crate::scene::{Mesh, Scene};
 use crate::sdf::{Sdf, annotate, suspect_delays};
-use crate::settings::Document;
+use crate::settings::{Assignment, Document};
 use crate::stimulus::recording::{read_events, read_starts};
 use crate::sweep::{Study, study_of};
 use crate::system::WindowPolicy;
@@ -71,7 +71,8 @@ pub const READERS: &[(&str, Reader)] = &[
             path.with_extension("csv"),
         );
         fs::copy(path, &csv).expect("a file of ours");
-        error_text(scene.assign(&format!("lidar.pulse={:?}", csv.display()), "--set"))?;
+        let file = csv.display().to_string();
+        assign(&mut scene, Assignment::new("lidar.pulse", file, "--set"))?;
         error_text(Scene::read(&scene))
     }),
     ("sdf", |path| {
@@ -129,6 +130,13 @@ pub const READERS: &[(&str, Reader)] = &[
     }),
 ];
 
+fn assign(
+    document: &mut Document,
+    assignment: Result<Assignment, InputError>,
+) -> Result<(), String> {
+    error_text(assignment.and_then(|assignment| document.assign(&assignment)))
+}
+
 fn error_text<T, E: ToString>(read: Result<T, E>) -> Result<(), String> {
     read.map(drop).map_err(|error| error.to_string())
 }
@@ -167,8 +175,8 @@ fn read_options(path: &Path) -> Result<(), String> {
             Some(("windows", policy)) => {
                 error_text(WindowPolicy::default().with_changes(policy, "--windows"))?;
             }
-            Some(("sensor", assignment)) => error_text(sensor.assign(assignment, "--set"))?,
-            Some(("scene", assignment)) => error_text(scene.assign(assignment, "--set"))?,
+            Some(("sensor", text)) => assign(&mut sensor, Assignment::parse(text, "--set"))?,
+            Some(("scene", text)) => assign(&mut scene, Assignment::parse(text, "--set"))?,
             _ => return Err(format!("{line} is no option")),
         }
     }

@@ -15,7 +15,7 @@ use crate::files::InputError;
 use crate::netlist::{Conditions, Corner, Mismatch};
 use crate::request::{Sources, Spelling};
 use crate::scene::Scene;
-use crate::settings::{Notes, said_remarks};
+use crate::settings::{Assignment, Notes, said_remarks};
 
 /// Which sensor.
 #[derive(Args)]
@@ -89,7 +89,7 @@ impl SensorArgs {
     /// # Errors
     /// Unreadable files, bad keys and values, and `--set` of anything but the sensor.
     pub(super) fn read(&self) -> Result<Sensor, InputError> {
-        let sensor = self.sources(None).read_sensor()?;
+        let sensor = self.sources(None)?.read_sensor()?;
         self.warn_of_unusual(&sensor);
         Ok(sensor)
     }
@@ -107,15 +107,14 @@ impl SensorArgs {
 
     /// Why the values of the chip were chosen, if it is built in.
     fn notes(&self) -> Notes {
-        let sources = self.sources(None);
         let default = self.sensor.is_none().then_some(CHIPS[0].name);
-        let name = sources.chip().or(default);
+        let name = self.names(None).chip().or(default);
         name.and_then(Sensor::built_in_notes).unwrap_or_default()
     }
 
     /// What the top of the exported chip is called: modes of a chip are named after it.
     pub(super) fn chip(&self) -> &'static str {
-        let asked = self.sources(None).chip().unwrap_or(array::NAME);
+        let asked = self.names(None).chip().unwrap_or(array::NAME);
         let mut chips = CHIPS.iter().map(|chip| chip.name);
         chips.find(|chip| asked.starts_with(chip)).unwrap_or(asked)
     }
@@ -145,35 +144,57 @@ impl SensorArgs {
     /// Whether rows and columns are both asked for on the command line.
     pub(super) fn gives_size(&self) -> bool {
         let is_set = |key: &str| {
-            let prefix = format!("sensor.{key}=");
-            self.set.iter().any(|set| set.starts_with(&prefix))
+            let mut given = self
+                .set
+                .iter()
+                .filter_map(|text| Assignment::parse(text, "").ok());
+            given.any(|given| given.names() == ["sensor", key])
         };
         (self.rows.is_some() || is_set("rows")) && (self.cols.is_some() || is_set("cols"))
     }
 
     /// What `--liberty` and `--cell` set.
-    fn set_of_cells(&self) -> impl Iterator<Item = String> {
-        let files = self.liberty.iter().flat_map(|files| library_files(files));
-        let files = files.map(|file| std::path::absolute(&file).unwrap_or(file));
-        let setting = library_setting(files);
-        let file =
-            (!self.liberty.is_empty()).then(|| format!("sensor.liberty={}", setting.display()));
-        let cells = (!self.cell.is_empty())
-            .then(|| format!("sensor.liberty_cells={}", self.cell.join(", ")));
-        file.into_iter().chain(cells)
+    fn set_of_cells(&self) -> Result<Vec<Assignment>, InputError> {
+        let mut set = Vec::new();
+        if !self.liberty.is_empty() {
+            let files = self.liberty.iter().flat_map(|files| library_files(files));
+            let files = files.map(|file| std::path::absolute(&file).unwrap_or(file));
+            let setting = library_setting(files).display().to_string();
+            let origin = format!("--liberty {setting}");
+            set.push(Assignment::new("sensor.liberty", setting, origin)?);
+        }
+        if !self.cell.is_empty() {
+            let cells = self.cell.join(", ");
+            let origin = format!("--cell {}", self.cell.join(" --cell "));
+            set.push(Assignment::new("sensor.liberty_cells", cells, origin)?);
+        }
+        Ok(set)
     }
 
-    fn sources(&self, scene: Option<PathBuf>) -> Sources {
+    /// The sensor and the scene with all that is set.
+    ///
+    /// # Errors
+    /// `--set` of what is no key and value.
+    fn sources(&self, scene: Option<PathBuf>) -> Result<Sources, InputError> {
+        let mut set = self.set_of_cells()?;
+        for text in &self.set {
+            set.push(Assignment::parse(text, format!("--set {text}"))?);
+        }
+        Ok(Sources {
+            set,
+            ..self.names(scene)
+        })
+    }
+
+    /// The sensor and the scene as they are named, before anything is set.
+    fn names(&self, scene: Option<PathBuf>) -> Sources {
         Sources {
             sensor: self.sensor.clone(),
             scene,
             rows: self.rows,
             cols: self.cols,
             block: self.block.clone(),
-            set: self
-                .set_of_cells()
-                .chain(self.set.iter().cloned())
-                .collect(),
+            set: Vec::new(),
             spelling: Spelling::Options,
         }
     }
@@ -193,7 +214,7 @@ impl SceneArgs {
     /// # Errors
     /// Unreadable files, bad keys and values.
     pub(super) fn read(&self) -> Result<(Sensor, Scene), InputError> {
-        let (sensor, scene) = self.sources().read()?;
+        let (sensor, scene) = self.sensor.sources(self.scene.clone())?.read()?;
         self.sensor.warn_of_unusual(&sensor);
         note_unusual(self.scene_name(), &scene.remarks());
         if let (Some(path), true) = (
@@ -210,7 +231,7 @@ impl SceneArgs {
 
     /// What reports call the scene.
     pub(super) fn scene_name(&self) -> String {
-        self.sources().scene_name()
+        self.sensor.names(self.scene.clone()).scene_name()
     }
 
     /// Why the values of the scene were chosen, if it is built in.
@@ -218,10 +239,6 @@ impl SceneArgs {
         let name = self.scene_name();
         let name = name.strip_prefix("built-in ");
         name.and_then(Scene::built_in_notes).unwrap_or_default()
-    }
-
-    fn sources(&self) -> Sources {
-        self.sensor.sources(self.scene.clone())
     }
 }
 

@@ -134,15 +134,13 @@ fn a_librarys_cells_count_as_generic_gates_do() {
         "{json}"
     );
     let read = |library: &str| {
-        let mut document = Document::from_table("a test", toml::Table::new());
         let block = folder.path().join("block.json");
-        for (key, value) in [
+        let keys = [
             ("p_counter_block", block.to_str().unwrap()),
             ("liberty", library),
-        ] {
-            document.set_value(key, value.into(), "the option");
-        }
-        SensorConfig::read_document(&document)
+        ];
+        let keys = keys.map(|(key, value)| (key.to_owned(), value.into()));
+        SensorConfig::read_document(&Document::from_table("a test", keys.into_iter().collect()))
     };
     let (own, generic) = (read(library).unwrap(), yosys::lfsr());
     let laws = [&own, &generic].map(|config| config.counter_law().unwrap());

@@ -6,7 +6,7 @@ use guided_dtof::chip::SensorConfig;
 use guided_dtof::guide::BehaviouralStereo;
 use guided_dtof::request::{FrameRequest, Sources, is_bad_input};
 use guided_dtof::scene::Scene;
-use guided_dtof::settings::{Key, Range, Settings};
+use guided_dtof::settings::{Assignment, Key, Range, Settings};
 use guided_dtof::system::{EngineKind, Frame, WindowPolicy, take_frame};
 
 /// Macropixels of the four look at a quarter of a degree each, as the street's do.
@@ -107,7 +107,7 @@ fn frame_with(
         scene: Some(scene.into()),
         rows: Some(2),
         cols: Some(2),
-        set: vec![set.to_owned()],
+        set: vec![Assignment::parse(set, set).unwrap()],
         ..Sources::default()
     };
     let (sensor, scene) = sources.read().map_err(|e| (e.to_string(), true))?;

@@ -14,9 +14,8 @@ use guided_dtof::settings::Document;
 /// The QuantIC4x4 with the counter of the book's chapter.
 pub fn lfsr() -> SensorConfig {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/blocks/lfsr_p_counter.json");
-    let mut document = Document::from_table("a test", toml::Table::new());
-    let file = file.to_str().unwrap().into();
-    document.set_value("p_counter_block", file, "the option");
+    let key = ("p_counter_block".to_owned(), file.to_str().unwrap().into());
+    let document = Document::from_table("a test", toml::Table::from_iter([key]));
     SensorConfig::read_document(&document).unwrap()
 }
 

@@ -200,7 +200,9 @@ fn netlists_are_refused_with_file_and_cure() {
         "--block",
         "p_counter=no.json",
     ];
-    refused(dir, &both, "--block p_counter=no.json: ");
+    let file = folder.path().join("no.json");
+    let says = format!("gdtof: {}: is no netlist of Yosys", file.display());
+    refused(dir, &both, &says);
 }
 
 #[test]

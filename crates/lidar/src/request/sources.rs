@@ -8,19 +8,16 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
 use super::spelling::Spelling;
 use crate::chip::own_block::replaceable;
 use crate::chip::sensors::CHIPS;
 use crate::chip::{Sensor, SensorConfig};
 use crate::files::{InputError, instead_of};
 use crate::scene::Scene;
-use crate::settings::Document;
+use crate::settings::{Assignment, Document};
 
 /// Where a sensor and a scene come from. The default is QuantIC4x4 before the street.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Sources {
     /// A sensor file (TOML), or one of the chips by name; a file of such a name comes first.
     pub sensor: Option<PathBuf>,
@@ -32,10 +29,9 @@ pub struct Sources {
     pub cols: Option<usize>,
     /// Netlists in the place of built-in blocks, as `p_counter=my.json`, relative to the current folder.
     pub block: Vec<String>,
-    /// Single keys, as `sensor.clk_hz=300e6`, `sensor.clk_hz=300 MHz` or `scene.lidar.pde=0.2`; the last one counts.
-    pub set: Vec<String>,
+    /// Single keys, such as `sensor.clk_hz` or `scene.lidar.pde`; the last one counts.
+    pub set: Vec<Assignment>,
     /// What complaints call these settings.
-    #[serde(skip)]
     pub spelling: Spelling,
 }
 
@@ -74,28 +70,26 @@ impl Sources {
             None => Document::from_table("the sensor", toml::Table::new()),
         };
         for assignment in &self.set {
-            let option = format!("{} {assignment}", self.spelling.name("set"));
-            if let Some(meant) = of_the_other_kind(assignment) {
-                let message = format!("there is no such key; did you mean {meant}?");
-                return Err(InputError::new(option, message));
+            let refuse = |message| Err(InputError::new(assignment.origin(), message));
+            if let Some(meant) = of_the_other_kind(assignment.names()) {
+                return refuse(format!("there is no such key; did you mean {meant}?"));
             }
-            if let Some(rest) = assignment.strip_prefix("sensor.") {
-                sensor.assign(rest, &option)?;
-            } else if let Some(rest) = assignment.strip_prefix("scene.") {
-                let Some(scene) = &mut scene else {
-                    let message = "this command reads no scene; leave it out";
-                    return Err(InputError::new(option, message));
-                };
-                scene.assign(rest, &option)?;
-            } else {
-                let message = "is not a key of the sensor or scene; give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE";
-                return Err(InputError::new(option, message));
+            let kind = assignment.names()[0].as_str();
+            match (kind, assignment.within_section(), &mut scene) {
+                ("sensor", Some(key), _) => sensor.assign(&key)?,
+                ("scene", Some(key), Some(scene)) => scene.assign(&key)?,
+                ("scene", Some(_), None) => {
+                    return refuse("this command reads no scene; leave it out".to_owned());
+                }
+                _ => {
+                    return refuse("is not a key of the sensor or scene; give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE".to_owned());
+                }
             }
         }
         for (key, value) in [("rows", self.rows), ("cols", self.cols)] {
             if let Some(value) = value {
                 let value = i64::try_from(value).unwrap_or(i64::MAX);
-                sensor.set_value(key, value.into(), &self.spelling.name(key));
+                sensor.assign(&Assignment::new(key, value, self.spelling.name(key))?)?;
             }
         }
         for block in &self.block {
@@ -116,7 +110,7 @@ impl Sources {
                 std::path::absolute(file).unwrap_or_else(|_| file.into())
             };
             let file = file.to_string_lossy().into_owned();
-            sensor.set_value(&format!("{name}_block"), file.into(), &option);
+            sensor.assign(&Assignment::new(&format!("{name}_block"), file, option)?)?;
         }
         Ok(SensorConfig::read_document(&sensor)?.into())
     }
@@ -139,13 +133,14 @@ impl Sources {
 }
 
 /// The name that a key of the scene has which is given as one of the sensor, or the other way round.
-fn of_the_other_kind(assignment: &str) -> Option<String> {
-    let (path, _) = assignment.split_once('=')?;
-    let (kind, rest) = path.trim().split_once('.')?;
-    let key = rest.rsplit('.').next()?;
-    match kind {
+fn of_the_other_kind(names: &[String]) -> Option<String> {
+    let [kind, rest @ ..] = names else {
+        return None;
+    };
+    let key = rest.last()?;
+    match kind.as_str() {
         "sensor" if SensorConfig::key(key).is_none() => scene_key_named(key),
-        "scene" if Scene::key(rest).is_none() => {
+        "scene" if Scene::key(&rest.join(".")).is_none() => {
             SensorConfig::key(key).map(|key| format!("sensor.{}", key.name))
         }
         _ => None,

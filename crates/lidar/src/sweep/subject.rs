@@ -17,6 +17,7 @@ use crate::chip::{Sensor, SensorConfig, library_files};
 use crate::files::{InputError, file_hash, in_plain_words};
 use crate::request::{FrameRequest, Sources, Spelling, eye_safety_of, is_bad_input, sentence};
 use crate::scene::{EyeSafety, Scene};
+use crate::settings::Assignment;
 use crate::system::{Frame, FrameSummary, NoDepth, SharedWork, WindowPolicy, take_shared_frame};
 
 /// A study's points as they are taken.
@@ -117,7 +118,11 @@ impl<'a> Subject<'a> {
                 }
                 Some(("frame", key)) => drop(frame.insert(key.into(), value.clone())),
                 Some(("theory", key)) => drop(of_theory.insert(key.into(), value.clone())),
-                Some(_) => sources.set.push(format!("{name}={value}")),
+                Some(_) => {
+                    let origin = format!("{name} = {value}");
+                    let assignment = Assignment::new(name, value.clone(), origin)?;
+                    sources.set.push(assignment);
+                }
             }
         }
         let world = match &scratch.world {

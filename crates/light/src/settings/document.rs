@@ -1,8 +1,7 @@
-//! A settings file and what `--set` changes in it, with the place of every value for complaints.
+//! A settings file and what assignments change in it, with the place of every value for complaints.
 //!
-//! `--set sensor.KEY=VALUE` and `--set scene.SECTION.KEY=VALUE` write as a line `KEY = VALUE` of that section would; a value
-//! that is no TOML is taken as text, so that words and quantities need no quotes. Later ones win, and all win over the
-//! file. An object goes by its name or its number from 1: `--set scene.object.car.reflectivity=0.5`.
+//! An [`Assignment`] writes as a line `KEY = VALUE` of its section would. Later ones win, and all win over the file. An object goes
+//! by its name or its number from 1: `object.car.reflectivity`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,6 +9,7 @@ use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
+use super::assignment::Assignment;
 use super::declare::Settings;
 use crate::files::{
     InputError, LineEnds, MOST_TOML_BYTES, in_plain_words, nearest, read_text_within,
@@ -40,7 +40,10 @@ impl Fault {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Origin {
     Line(usize),
-    Option(String),
+    Assignment {
+        origin: String,
+        text: Option<String>,
+    },
 }
 
 /// Settings as given, not yet checked.
@@ -108,27 +111,17 @@ impl Document {
         self.table.is_empty()
     }
 
-    /// Writes a value of the root, as the command-line option `option` asks.
-    pub fn set_value(&mut self, key: &str, value: Value, option: &str) {
-        self.table.insert(key.into(), value);
-        self.origins
-            .insert(key.into(), Origin::Option(option.into()));
-    }
-
-    /// Writes what `--set` asks, `assignment` without its first name (`sensor.`, `scene.`); `option` is the whole option.
+    /// Writes the value of an assignment.
     ///
     /// # Errors
-    /// When it is no assignment, or there is no such object.
-    pub fn assign(&mut self, assignment: &str, option: &str) -> Result<(), InputError> {
-        let complain = |message: String| Err(InputError::new(option, message));
-        let Some((names, value)) = assignment.split_once('=') else {
-            return complain("has no value; give key=value".into());
-        };
-        let Some(names) = names_of(names) else {
-            return complain(format!(
-                "{names:?} is not a key; give names with dots between them"
-            ));
-        };
+    /// When it names no section, or no object that there is.
+    pub fn assign(&mut self, assignment: &Assignment) -> Result<(), InputError> {
+        let Assignment {
+            names,
+            value,
+            origin,
+        } = assignment;
+        let complain = |message: String| Err(InputError::new(origin, message));
         let (last, folders) = names.split_last().expect("a key has a name");
         let mut path = String::new();
         let mut table = &mut self.table;
@@ -166,8 +159,12 @@ impl Document {
             };
         }
         extend(&mut path, last);
-        table.insert(last.clone(), value_of(value));
-        self.origins.insert(path, Origin::Option(option.into()));
+        table.insert(last.clone(), value.clone());
+        let origin = Origin::Assignment {
+            origin: origin.clone(),
+            text: value.as_str().map(str::to_owned),
+        };
+        self.origins.insert(path, origin);
         Ok(())
     }
 
@@ -237,7 +234,9 @@ impl Document {
         placed.sort_by(|a, b| a.0.cmp(&b.0));
         InputError::all(placed.into_iter().map(|(origin, message)| match origin {
             Some(Origin::Line(line)) => InputError::at_line(&self.source, line, message),
-            Some(Origin::Option(option)) => about_option(&option, message),
+            Some(Origin::Assignment { origin, text }) => {
+                about_assignment(&origin, &text.unwrap_or_default(), message)
+            }
             None => InputError::new(&self.source, message),
         }))
     }
@@ -273,11 +272,10 @@ impl Document {
     }
 }
 
-/// A complaint about what an option gave; about a file that it names, where the message begins with that.
-fn about_option(option: &str, message: String) -> InputError {
+/// A complaint about a value that was assigned; about a file that its text names, where the message begins with that.
+fn about_assignment(origin: &str, text: &str, message: String) -> InputError {
     let about_file = || {
-        let (_, value) = option.split_once('=')?;
-        let (file, rest) = value.split(',').find_map(|file| {
+        let (file, rest) = text.split(',').find_map(|file| {
             let file = file.trim();
             let rest = message.strip_prefix(file)?;
             (!file.is_empty() && rest.starts_with(':')).then_some((file, rest))
@@ -289,7 +287,7 @@ fn about_option(option: &str, message: String) -> InputError {
             None => InputError::new(file, rest.strip_prefix(": ")?),
         })
     };
-    about_file().unwrap_or_else(|| InputError::new(option, message))
+    about_file().unwrap_or_else(|| InputError::new(origin, message))
 }
 
 fn extend(path: &mut String, name: &str) {
@@ -335,30 +333,6 @@ fn note_lines(
             _ => {}
         }
     }
-}
-
-/// The names of a dotted key, as TOML reads it.
-fn names_of(key: &str) -> Option<Vec<String>> {
-    let mut value: Value = one_value(&format!("{key} = 0"))?.into();
-    let mut names = Vec::new();
-    while let Value::Table(table) = value {
-        let (name, inner) = table.into_iter().next()?;
-        names.push(name);
-        value = inner;
-    }
-    (!names.is_empty()).then_some(names)
-}
-
-fn value_of(text: &str) -> Value {
-    let table = one_value(&format!("x = {text}"));
-    let value = table.and_then(|mut table| table.remove("x"));
-    value.unwrap_or_else(|| Value::String(text.trim().into()))
-}
-
-/// A table with a single value.
-fn one_value(text: &str) -> Option<Table> {
-    let table: Table = toml::from_str(text).ok()?;
-    (table.len() == 1).then_some(table)
 }
 
 fn index_in(list: &[Value], which: &str) -> Option<usize> {

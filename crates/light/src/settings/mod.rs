@@ -8,6 +8,7 @@
 //! A struct of settings is declared by [`keys!`](crate::keys), a word of them by [`words!`](crate::words): each key stands once, with its
 //! unit, its range, its default and where that comes from, for reading, for rules, and for the commented file that `commented` prints.
 
+mod assignment;
 mod declare;
 mod document;
 mod key;
@@ -18,6 +19,7 @@ mod remarks;
 mod schema;
 
 pub use crate::{keys, words};
+pub use assignment::Assignment;
 pub use declare::{Setting, Settings, help};
 pub use document::{Document, Fault};
 pub use key::{Key, Range};

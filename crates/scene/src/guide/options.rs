@@ -12,7 +12,7 @@ use super::{
 };
 use crate::files::{InputError, instead_of};
 use crate::settings::Range::Within;
-use crate::settings::{Document, Key, Settings, keys};
+use crate::settings::{Assignment, Document, Key, Settings, keys};
 
 /// A guide that goes by a name.
 #[derive(Debug)]
@@ -136,8 +136,8 @@ pub fn parse(text: &str, source: &str) -> Result<Arc<dyn Guide>, InputError> {
     };
     let option = format!("{source} {text}");
     let mut document = Document::from_table(&option, Table::new());
-    for assignment in settings.split(',').filter(|part| !part.is_empty()) {
-        document.assign(assignment, &option)?;
+    for text in settings.split(',').filter(|part| !part.is_empty()) {
+        document.assign(&Assignment::parse(text, &option)?)?;
     }
     if kind.name == "file" && !document.table.contains_key("path") {
         return Err(InputError::new(

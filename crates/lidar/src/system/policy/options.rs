@@ -4,7 +4,7 @@ use toml::Table;
 
 use super::WindowPolicy;
 use crate::files::InputError;
-use crate::settings::{Document, Key, Range, Settings};
+use crate::settings::{Assignment, Document, Key, Range, Settings};
 
 impl WindowPolicy {
     /// This policy with what `text` changes in it; `source` is what complaints call the place where it stands.
@@ -14,17 +14,13 @@ impl WindowPolicy {
     pub fn with_changes(self, text: &str, source: &str) -> Result<Self, InputError> {
         let option = format!("{source} {text}");
         let mut document = Document::from_table(&option, Table::new());
-        for assignment in text.split(',').filter(|part| !part.trim().is_empty()) {
-            let is_its = |key: &&Key| matches!(key.range, Range::OneOf(words) if words.contains(&assignment.trim()));
+        for text in text.split(',').filter(|part| !part.trim().is_empty()) {
+            let is_its = |key: &&Key| matches!(key.range, Range::OneOf(words) if words.contains(&text.trim()));
             if let Some(key) = Self::KEYS.iter().find(is_its) {
-                let message = format!(
-                    "names no key; did you mean {}={}?",
-                    key.name,
-                    assignment.trim()
-                );
+                let message = format!("names no key; did you mean {}={}?", key.name, text.trim());
                 return Err(InputError::new(option, message));
             }
-            document.assign(assignment, &option)?;
+            document.assign(&Assignment::parse(text, &option)?)?;
         }
         let mut faults = Vec::new();
         let read = document.section::<WindowPolicy>("", &document.table, &mut faults);
