@@ -111,71 +111,18 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{GroundTruth, Object, Shape, Stage};
+    use crate::scene::shape::{any_point, any_shape};
+    use crate::scene::{GroundTruth, Object, Stage};
     use proptest::prelude::*;
-
-    fn point(within_m: f64) -> impl Strategy<Value = DVec3> {
-        let along = -within_m..within_m;
-        (along.clone(), along.clone(), along).prop_map(|(x, y, z)| DVec3::new(x, y, z))
-    }
-
-    fn shapes() -> impl Strategy<Value = Shape> {
-        let middle = || point(20.0);
-        let any_way = || point(1.0).prop_filter("a direction", |axis| axis.length() > 0.1);
-        prop_oneof![
-            Just(Shape::Ground { depth_m: 1.5 }),
-            (middle(), any_way(), 0.1f64..9.0, 0.1f64..9.0).prop_map(
-                |(centre_m, normal, width_m, height_m)| Shape::Plane {
-                    centre_m,
-                    normal,
-                    width_m,
-                    height_m
-                }
-            ),
-            (middle(), point(5.0), -180f64..180.0).prop_map(|(centre_m, size, yaw_deg)| {
-                Shape::Box {
-                    centre_m,
-                    size_m: size.abs() + 0.01,
-                    yaw_deg,
-                }
-            }),
-            (middle(), 0.1f64..4.0)
-                .prop_map(|(centre_m, radius_m)| Shape::Sphere { centre_m, radius_m }),
-            (middle(), any_way(), 0.1f64..2.0, 0.1f64..9.0).prop_map(
-                |(centre_m, axis, radius_m, height_m)| Shape::Cylinder {
-                    centre_m,
-                    axis,
-                    radius_m,
-                    height_m
-                }
-            ),
-            (middle(), any_way(), 0.1f64..2.0, 0f64..3.0, 0.1f64..9.0).prop_map(
-                |(centre_m, axis, radius_m, tip_radius_m, height_m)| Shape::Cone {
-                    centre_m,
-                    axis,
-                    radius_m,
-                    tip_radius_m,
-                    height_m
-                }
-            ),
-            (middle(), 0.5f64..3.0, -180f64..180.0).prop_map(|(foot_m, height_m, yaw_deg)| {
-                Shape::Person {
-                    foot_m,
-                    height_m,
-                    yaw_deg,
-                }
-            }),
-        ]
-    }
 
     proptest! {
         /// Rays from anywhere, in groups.
         #[test]
         fn rays_from_elsewhere_meet_what_they_may_meet(
-            shapes in prop::collection::vec(shapes(), 1..8),
-            place_m in point(3.0),
-            towards in point(1.0).prop_filter("a direction", |towards| towards.length() > 0.1),
-            spread in prop::collection::vec(point(0.05), 1..40),
+            shapes in prop::collection::vec(any_shape(), 1..8),
+            place_m in any_point(3.0),
+            towards in any_point(1.0).prop_filter("a direction", |towards| towards.length() > 0.1),
+            spread in prop::collection::vec(any_point(0.05), 1..40),
         ) {
             let mut scene = Scene::outdoor();
             scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
@@ -190,9 +137,9 @@ mod tests {
         /// Shadows: the slow way tries every shape.
         #[test]
         fn rays_are_blocked_by_what_they_meet(
-            shapes in prop::collection::vec(shapes(), 1..8),
-            from_m in prop::collection::vec(point(20.0), 40),
-            towards in point(1.0).prop_filter("a direction", |towards| towards.length() > 0.1),
+            shapes in prop::collection::vec(any_shape(), 1..8),
+            from_m in prop::collection::vec(any_point(20.0), 40),
+            towards in any_point(1.0).prop_filter("a direction", |towards| towards.length() > 0.1),
         ) {
             let mut scene = Scene::outdoor();
             scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
@@ -207,7 +154,7 @@ mod tests {
         /// Every macropixel, through panes and over mirrors.
         #[test]
         fn rays_return_the_same_from_the_objects_they_may_meet(
-            shapes in prop::collection::vec((shapes(), 0f64..0.9, 0f64..0.9), 1..8),
+            shapes in prop::collection::vec((any_shape(), 0f64..0.9, 0f64..0.9), 1..8),
             fov_deg in 5f64..120.0,
         ) {
             let mut scene = Scene::outdoor();

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::bounds::Candidates;
 use super::bundle::{Bundle, reflected};
 use super::settings::Scene;
-use super::shape::{Meeting, PlacedShape, Shape};
+use super::shape::{Meeting, PlacedShape, Shape, Surface};
 use super::vector::Ray;
 
 #[cfg(test)]

@@ -96,6 +96,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::shape::{any_point, any_shape};
     use crate::scene::{Object, Pattern, Ray, Shape, Texture, turned};
     use proptest::prelude::*;
 
@@ -138,9 +139,8 @@ mod tests {
         assert_eq!(interpolate(std::iter::empty::<[f64; 2]>(), 1.0), None);
     }
 
-    fn still_life() -> Scene {
+    fn still_life(shapes: Vec<Shape>) -> Scene {
         let mut scene = Scene::outdoor();
-        let centre_m = DVec3::new(1.0, 0.0, 9.0);
         let noise = |object| Object {
             texture: Some(Texture {
                 turn_deg: 20.0,
@@ -149,45 +149,8 @@ mod tests {
             }),
             ..object
         };
-        let size_m = DVec3::new(2.0, 1.0, 3.0);
-        let shapes = [
-            Shape::Ground { depth_m: 1.5 },
-            Shape::Plane {
-                centre_m,
-                normal: DVec3::new(1.0, -0.5, -1.0),
-                width_m: 6.0,
-                height_m: 7.0,
-            },
-            Shape::Box {
-                centre_m,
-                size_m,
-                yaw_deg: 30.0,
-            },
-            Shape::Sphere {
-                centre_m,
-                radius_m: 1.2,
-            },
-            Shape::Cylinder {
-                centre_m,
-                axis: DVec3::new(0.3, 1.0, 0.2),
-                radius_m: 0.5,
-                height_m: 4.0,
-            },
-            Shape::Cone {
-                centre_m: centre_m + DVec3::new(0.0, -1.0, -1.5),
-                axis: DVec3::new(0.3, -1.0, 0.2),
-                radius_m: 0.7,
-                tip_radius_m: 0.1,
-                height_m: 1.5,
-            },
-            Shape::Person {
-                foot_m: centre_m,
-                height_m: 1.8,
-                yaw_deg: 70.0,
-            },
-        ];
+        let shapes = shapes.into_iter();
         scene.objects = shapes
-            .into_iter()
             .map(|shape| noise(Object::new("it", 0.6, shape)))
             .collect();
         scene
@@ -198,16 +161,15 @@ mod tests {
         /// range, material and, turned back, the normal.
         #[test]
         fn a_moving_rig_sees_what_moved_rays_see(
-            x in -0.5f64..0.5, y in -0.3f64..0.5, time_s in -2f64..3.0,
+            shapes in prop::collection::vec(any_shape(), 1..20), towards in any_point(1.0), time_s in -2f64..3.0,
             forward in -3f64..3.0, right in -2f64..2.0, down in -0.2f64..0.2, yaw_rate_deg_s in -40f64..40.0,
         ) {
-            let mut scene = still_life();
+            let mut scene = still_life(shapes);
             scene.rig = Rig { velocity_m_s: DVec3::new(right, down, forward), yaw_rate_deg_s, waypoints: vec![] };
             let (position_m, yaw_deg) = scene.rig.pose(time_s);
             let (sine, cosine) = yaw_deg.to_radians().sin_cos();
-            let direction = DVec3::new(x, y, 1.0);
-            let seen = scene.snapshot(time_s).hit(&Ray::new(DVec3::ZERO, direction));
-            let expected = scene.hit(&Ray::new(position_m, turned(direction, (cosine, sine))));
+            let seen = scene.snapshot(time_s).hit(&Ray::new(DVec3::ZERO, towards));
+            let expected = scene.hit(&Ray::new(position_m, turned(towards, (cosine, sine))));
             match (seen, expected) {
                 (Some(seen), Some(expected)) => {
                     prop_assert!((seen.range_m - expected.range_m).abs() < 1e-6);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::rig::Waypoint;
-use super::shape::{PlacedShape, Shape};
+use super::shape::{PlacedShape, Shape, Surface};
 use super::texture::Texture;
 
 /// A thing that reflects light, evenly and diffusely.

@@ -1,6 +1,7 @@
 //! What rays meet, and what sends light back along them.
 
 use super::*;
+use crate::scene::shape::{any_point, any_shape};
 use crate::scene::{Object, Pattern, Shape, Texture};
 use proptest::prelude::*;
 
@@ -146,32 +147,25 @@ proptest! {
     /// right angles to it.
     #[test]
     fn normals_are_at_right_angles_to_the_surface(
-        x in -0.4f64..0.4, y in -0.4f64..0.4, yaw_deg in -180.0f64..180.0, kind in 0..7,
+        shape in any_shape(), aside in any_point(0.7),
     ) {
-        let centre_m = DVec3::new(0.0, 0.0, 5.0);
-        let shape = match kind {
-            0 => Shape::Ground { depth_m: 1.0 },
-            1 => Shape::Plane { centre_m, normal: DVec3::new(0.3, -0.5, 1.0), width_m: 9.0, height_m: 9.0 },
-            2 => Shape::Box { centre_m, size_m: DVec3::new(1.0, 2.0, 3.0), yaw_deg },
-            3 => Shape::Sphere { centre_m, radius_m: 1.5 },
-            4 => Shape::Cylinder { centre_m, axis: DVec3::new(0.2, -0.5, yaw_deg / 90.0), radius_m: 0.8, height_m: 2.0 },
-            5 => Shape::Cone {
-                centre_m, axis: DVec3::new(0.2, -0.5, yaw_deg / 90.0), radius_m: 1.2, tip_radius_m: 0.2, height_m: 2.0,
-            },
-            _ => Shape::Person { foot_m: DVec3::new(0.0, 1.0, 5.0), height_m: 2.0, yaw_deg },
-        };
+        // Most rays aimed at it meet it.
+        let (middle, reach_m) = shape.ball_around().unwrap_or((DVec3::new(0.0, 4.0, 5.0), 3.0));
+        let aim = (middle + aside * reach_m).normalize();
+        let (right, down) = aim.any_orthonormal_pair();
         let scene = scene(vec![Object::new("it", 0.5, shape)]);
-        let ray = |x, y| Ray::new(DVec3::ZERO, DVec3::new(x, y, 1.0));
-        let Some(hit) = scene.hit(&ray(x, y)) else { return Ok(()) };
+        let ray = |x: f64, y: f64| Ray::new(DVec3::ZERO, aim + right * x + down * y);
+        let straight = ray(0.0, 0.0);
+        let Some(hit) = scene.hit(&straight) else { return Ok(()) };
         prop_assert!((hit.normal.length() - 1.0).abs() < 1e-12);
-        prop_assert!(hit.normal.dot(ray(x, y).direction) <= 0.0);
-        let point = ray(x, y).point(hit.range_m);
+        prop_assert!(hit.normal.dot(straight.direction) <= 0.0);
+        let point = straight.point(hit.range_m);
         for (dx, dy) in [(1e-6, 0.0), (0.0, 1e-6)] {
-            let beside = ray(x + dx, y + dy);
+            let beside = ray(dx, dy);
             let Some(next) = scene.hit(&beside) else { continue };
             let same_face = (next.normal - hit.normal).length() < 1e-3;
             // Where a ray grazes, one step is no small one.
-            if same_face && hit.normal.dot(ray(x, y).direction) < -0.1 {
+            if same_face && hit.normal.dot(straight.direction) < -0.1 {
                 let along = (beside.point(next.range_m) - point).normalize();
                 prop_assert!(along.dot(hit.normal).abs() < 1e-3, "{along} {}", hit.normal);
             }

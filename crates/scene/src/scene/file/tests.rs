@@ -1,8 +1,14 @@
 //! Scene files: what they say is read, and what is wrong with them is reported.
 
+use std::collections::BTreeSet;
+
 use super::*;
-use crate::scene::{Lidar, Stereo};
+use crate::scene::entry::ObjectKind;
+use crate::scene::shape::any_shape;
+use crate::scene::{Lidar, Object, Stereo};
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
 
 const OUTDOOR: &str = include_str!("../../../../../vectors/scenes/outdoor.toml");
 
@@ -461,4 +467,24 @@ fn lists_and_files_that_are_too_long_are_refused_with_their_number() {
         let refused = Scene::parse("a.toml", &text).unwrap_err().to_string();
         assert!(refused.starts_with(says), "{refused}");
     }
+}
+
+/// A test that draws shapes draws those of all kinds.
+#[test]
+fn every_kind_without_files_is_drawn_and_comes_back_from_its_file() {
+    let (mut drawn, mut runner) = (BTreeSet::new(), TestRunner::deterministic());
+    for _ in 0..300 {
+        let shape = any_shape().new_tree(&mut runner).unwrap().current();
+        let mut scene = Scene::outdoor();
+        scene.objects = vec![Object::new("it", 0.5, shape)];
+        let text = scene.commented();
+        assert_eq!(Scene::parse("printed", &text).unwrap(), scene);
+        let line = text.lines().find(|line| line.starts_with("kind = "));
+        drawn.insert(line.unwrap().split('"').nth(1).unwrap().to_owned());
+    }
+    let names = ObjectKind::NAMES.iter().map(|name| (*name).to_owned());
+    let plain: BTreeSet<String> = names
+        .filter(|name| !["mesh", "map"].contains(&name.as_str()))
+        .collect();
+    assert_eq!(drawn, plain);
 }

@@ -11,10 +11,11 @@ use glam::DVec3;
 
 use super::meeting::Meeting;
 use super::round::{SIDE, between_ends};
+use super::surface::{Surface, turned_back};
 use crate::scene::vector::Ray;
 
 /// A cone where it stands.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(in crate::scene) struct Cone {
     centre_m: DVec3,
     /// Of unit length.
@@ -81,13 +82,15 @@ impl Cone {
             before(other)
         })
     }
+}
 
-    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+impl Surface for Cone {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let inside = self.inside_side(ray)?;
         between_ends(ray, (self.centre_m, self.axis), self.half_m, inside)
     }
 
-    pub(super) fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
+    fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
         match part {
             SIDE => {
                 let outwards = self.off_axis(point - self.centre_m).normalize_or_zero();
@@ -99,7 +102,7 @@ impl Cone {
     }
 
     /// How the normal turns along a small step within the surface: around the axis only, and most near the tip.
-    pub(super) fn bend(&self, point: DVec3, part: u32, step_m: DVec3) -> DVec3 {
+    fn bend(&self, point: DVec3, part: u32, step_m: DVec3) -> DVec3 {
         let from_axis = self.off_axis(point - self.centre_m);
         let away_m2 = from_axis.length_squared();
         if part != SIDE || away_m2 == 0.0 {
@@ -109,14 +112,10 @@ impl Cone {
         around / (away_m2.sqrt() * libm::hypot(1.0, self.slope))
     }
 
-    /// Around the side and along it, or across an end; `turned_back` undoes a turn about the vertical axis.
-    pub(super) fn on_surface(
-        &self,
-        point: DVec3,
-        part: u32,
-        turned_back: impl Fn(DVec3) -> DVec3,
-    ) -> (f64, f64) {
-        let (offset, axis) = (turned_back(point - self.centre_m), turned_back(self.axis));
+    /// Around the side and along it, or across an end.
+    fn on_surface(&self, point: DVec3, part: u32, seen_turned_deg: f64) -> (f64, f64) {
+        let offset = turned_back(point - self.centre_m, seen_turned_deg);
+        let axis = turned_back(self.axis, seen_turned_deg);
         let (side, other) = axis.any_orthonormal_pair();
         let (x, y) = (offset.dot(side), offset.dot(other));
         match part {

@@ -3,11 +3,28 @@
 use glam::DVec3;
 
 use super::meeting::{Meeting, in_front};
+use super::surface::Surface;
 use crate::scene::vector::Ray;
 
-pub(super) fn meet_ground(ray: &Ray, depth_m: f64) -> Option<Meeting> {
-    let range_m = in_front((depth_m - ray.origin.y) / ray.direction.y)?;
-    Some(Meeting { range_m, part: 0 })
+/// The ground.
+#[derive(Debug)]
+pub(in crate::scene) struct Level {
+    pub(super) depth_m: f64,
+}
+
+impl Surface for Level {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+        let range_m = in_front((self.depth_m - ray.origin.y) / ray.direction.y)?;
+        Some(Meeting { range_m, part: 0 })
+    }
+
+    fn normal_at(&self, _point: DVec3, _part: u32) -> DVec3 {
+        DVec3::NEG_Y
+    }
+
+    fn on_surface(&self, point: DVec3, _part: u32, _seen_turned_deg: f64) -> (f64, f64) {
+        (point.x, -point.z)
+    }
 }
 
 /// A rectangle where it stands.
@@ -15,7 +32,7 @@ pub(super) fn meet_ground(ray: &Ray, depth_m: f64) -> Option<Meeting> {
 pub(in crate::scene) struct Flat {
     centre_m: DVec3,
     /// Of unit length.
-    pub(super) normal: DVec3,
+    normal: DVec3,
     /// Directions of its edges. The first is horizontal; a plane that lies flat has no preferred one and takes x.
     edges: [DVec3; 2],
     half_m: [f64; 2],
@@ -41,7 +58,15 @@ impl Flat {
         }
     }
 
-    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+    /// Where a point lies along the two edges, from the middle.
+    fn along_edges(&self, point: DVec3) -> (f64, f64) {
+        let offset = point - self.centre_m;
+        (offset.dot(self.edges[0]), offset.dot(self.edges[1]))
+    }
+}
+
+impl Surface for Flat {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let away_m = (self.centre_m - ray.origin).dot(self.normal);
         let range_m = in_front(away_m / ray.direction.dot(self.normal))?;
         let point = ray.point(range_m);
@@ -49,14 +74,16 @@ impl Flat {
         if 4.0 * (point - self.centre_m).length_squared() > self.reach_m2 {
             return None;
         }
-        let (along_m, across_m) = self.on_surface(point);
+        let (along_m, across_m) = self.along_edges(point);
         let inside = along_m.abs() <= self.half_m[0] && across_m.abs() <= self.half_m[1];
         inside.then_some(Meeting { range_m, part: 0 })
     }
 
-    /// Where a point lies along the two edges, from the middle.
-    pub(super) fn on_surface(&self, point: DVec3) -> (f64, f64) {
-        let offset = point - self.centre_m;
-        (offset.dot(self.edges[0]), offset.dot(self.edges[1]))
+    fn normal_at(&self, _point: DVec3, _part: u32) -> DVec3 {
+        self.normal
+    }
+
+    fn on_surface(&self, point: DVec3, _part: u32, _seen_turned_deg: f64) -> (f64, f64) {
+        self.along_edges(point)
     }
 }

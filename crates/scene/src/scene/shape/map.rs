@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::meeting::{Meeting, in_front};
+use super::pose::Pose;
+use super::surface::Surface;
 use crate::files::{InputError, Raster};
 use crate::scene::camera::PinholeCamera;
 use crate::scene::vector::Ray;
@@ -166,7 +168,7 @@ impl DepthMap {
     }
 
     /// Where a ray in the camera's coordinates first meets the map.
-    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let (origin, direction) = (ray.origin, ray.direction);
         if direction.z <= 0.0 {
             return None;
@@ -240,7 +242,7 @@ impl DepthMap {
     }
 
     /// The normal at a point of the surface: the plane in which 1/z of the pixels about it lies.
-    pub(super) fn normal_at(&self, point: DVec3) -> DVec3 {
+    fn normal_at(&self, point: DVec3) -> DVec3 {
         let Some((u, v)) = self.pixel_of(point) else {
             return DVec3::Z;
         };
@@ -268,13 +270,49 @@ impl DepthMap {
     }
 
     /// Reflectivity and grey at a point of the surface, where files give them.
-    pub(super) fn material_at(&self, point: DVec3) -> (Option<f64>, Option<f64>) {
+    fn material_at(&self, point: DVec3) -> (Option<f64>, Option<f64>) {
         let pixel = self.pixel_of(point).and_then(|at| self.camera.pixel_at(at));
         let value = |raster: &Option<Raster>| {
             let ((row, col), raster) = (pixel?, raster.as_ref()?);
             Some(f64::from(raster.value(row as usize, col as usize)))
         };
         (value(&self.reflectivity), value(&self.grey))
+    }
+}
+
+/// A map with the place and the turn of its camera.
+#[derive(Debug)]
+pub(in crate::scene) struct PlacedMap<'a> {
+    pose: Pose,
+    map: &'a DepthMap,
+}
+
+impl<'a> PlacedMap<'a> {
+    pub(super) fn new(centre_m: DVec3, yaw_deg: f64, map: &'a DepthMap) -> Self {
+        PlacedMap {
+            pose: Pose::new(centre_m, yaw_deg),
+            map,
+        }
+    }
+}
+
+impl Surface for PlacedMap<'_> {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+        self.map.intersect(&self.pose.inwards(ray))
+    }
+
+    fn normal_at(&self, point: DVec3, _part: u32) -> DVec3 {
+        self.pose
+            .outwards(self.map.normal_at(self.pose.inside(point)))
+    }
+
+    fn on_surface(&self, point: DVec3, _part: u32, _seen_turned_deg: f64) -> (f64, f64) {
+        let inside = self.pose.inside(point);
+        (inside.x, inside.y)
+    }
+
+    fn own_material(&self, point: DVec3) -> (Option<f64>, Option<f64>) {
+        self.map.material_at(self.pose.inside(point))
     }
 }
 

@@ -24,7 +24,10 @@ use crate::files::{InputError, open_input, skip_mark};
 use crate::scene::vector::Ray;
 
 mod listed;
+mod placed;
 mod tree;
+
+pub(in crate::scene) use placed::PlacedMesh;
 
 /// Most triangles of a mesh. With their tree they take about 160 bytes each.
 const MOST_TRIANGLES: usize = 4_000_000;
@@ -217,7 +220,7 @@ impl Mesh {
 
     /// Where a ray in the mesh's own coordinates first meets it; the part is the triangle's place in the tree's order. Of two in the same
     /// place the one listed first in the file counts.
-    pub(super) fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
         let about = Ray {
             origin: ray.origin - self.middle,
             direction: ray.direction,
@@ -268,14 +271,14 @@ impl Mesh {
         (inside && range > NEAREST_M && range.is_finite()).then_some(range)
     }
 
-    pub(crate) fn normal(&self, triangle: u32) -> DVec3 {
+    fn normal(&self, triangle: u32) -> DVec3 {
         let [a, b, c] = self.corners_of(triangle);
         (b - a).cross(c - a).normalize()
     }
 
     /// Texture coordinates of a point of a triangle as the file has them; where it has none, places in its units of length,
     /// seen along the axis that the triangle faces most.
-    pub(super) fn on_surface(&self, point: DVec3, triangle: u32) -> (f64, f64) {
+    fn on_surface(&self, point: DVec3, triangle: u32) -> (f64, f64) {
         let [a, b, c] = self.corners_of(triangle);
         let normal = (b - a).cross(c - a);
         let Some(places) = self.on_texture.get(triangle as usize) else {

@@ -10,9 +10,11 @@
 //!          └─ map:    depths that a camera has seen
 //! ```
 //!
-//! Shapes that can be turned do their geometry in coordinates of their own ([`Pose`](pose::Pose)), worked out once for many rays
-//! ([`PlacedShape`]).
+//! Each kind made ready for many rays ([`PlacedShape`]) is a [`Surface`]. Those that can be turned do their geometry in coordinates of their own
+//! ([`Pose`](pose::Pose)).
 
+#[cfg(test)]
+mod any_shape;
 mod cone;
 mod flat;
 mod kinds;
@@ -24,12 +26,16 @@ mod placed;
 mod pose;
 mod round;
 mod solid;
+mod surface;
 
+#[cfg(test)]
+pub(super) use any_shape::{any_point, any_shape};
 pub use kinds::Shape;
 pub use map::{DepthMap, MapFiles};
 pub(super) use meeting::Meeting;
 pub use mesh::Mesh;
 pub(super) use placed::PlacedShape;
+pub(super) use surface::Surface;
 
 #[cfg(test)]
 mod tests {

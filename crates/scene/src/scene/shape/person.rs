@@ -13,6 +13,8 @@
 use glam::DVec3;
 
 use super::meeting::{Meeting, NEAREST_M};
+use super::pose::Pose;
+use super::surface::Surface;
 use super::{round, solid};
 use crate::scene::vector::Ray;
 
@@ -43,9 +45,42 @@ const LIMBS: [Limb; 7] = [
 /// What all limbs lie in: middle and size.
 pub(super) const AROUND: (DVec3, DVec3) = (point(0.0, -0.5, 0.0), point(0.38, 1.0, 0.32));
 
+/// A person where she or he stands.
+#[derive(Debug)]
+pub(in crate::scene) struct Person {
+    pose: Pose,
+    height_m: f64,
+}
+
+impl Person {
+    pub(super) fn new(foot_m: DVec3, yaw_deg: f64, height_m: f64) -> Self {
+        Person {
+            pose: Pose::new(foot_m, yaw_deg),
+            height_m,
+        }
+    }
+}
+
+impl Surface for Person {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+        intersect(&self.pose.inwards(ray), self.height_m)
+    }
+
+    fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
+        let inside = self.pose.inside(point) / self.height_m;
+        self.pose.outwards(normal_at(inside, part))
+    }
+
+    /// Front and back carry what hangs straight down them; no two limbs carry the same.
+    fn on_surface(&self, point: DVec3, _part: u32, _seen_turned_deg: f64) -> (f64, f64) {
+        let inside = self.pose.inside(point);
+        (inside.x + 0.7 * inside.z, inside.y)
+    }
+}
+
 /// Where a ray in the person's own place and turn meets a person of `height_m`. The part is the limb, and in steps of 8
 /// the axis of the trunk's face.
-pub(super) fn intersect(ray: &Ray, height_m: f64) -> Option<Meeting> {
+fn intersect(ray: &Ray, height_m: f64) -> Option<Meeting> {
     let ray = Ray {
         origin: ray.origin / height_m,
         direction: ray.direction,
@@ -75,7 +110,7 @@ pub(super) fn intersect(ray: &Ray, height_m: f64) -> Option<Meeting> {
 }
 
 /// The normal at a point on a limb, in the person's own coordinates.
-pub(super) fn normal_at(point: DVec3, part: u32) -> DVec3 {
+fn normal_at(point: DVec3, part: u32) -> DVec3 {
     match &LIMBS[(part % 8) as usize] {
         Limb::Ball(centre, _) => (point - centre).normalize(),
         Limb::Block(..) => solid::face_normal(part / 8),

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::meeting::{Meeting, in_front};
+use super::surface::{Surface, turned_back};
 use crate::scene::vector::Ray;
 
 /// The parts of a cylinder, or of a cone.
@@ -22,10 +23,91 @@ pub(super) fn meet_sphere(ray: &Ray, centre_m: DVec3, radius_m: f64) -> Option<M
     Some(Meeting { range_m, part: 0 })
 }
 
-/// Around the vertical axis at the equator, and down along the meridian.
-pub(super) fn on_sphere(offset: DVec3, radius_m: f64) -> (f64, f64) {
-    let down = libm::asin((offset.y / radius_m).clamp(-1.0, 1.0));
-    (radius_m * libm::atan2(offset.x, -offset.z), radius_m * down)
+/// A sphere where it stands.
+#[derive(Debug)]
+pub(in crate::scene) struct Ball {
+    pub(super) centre_m: DVec3,
+    pub(super) radius_m: f64,
+}
+
+impl Surface for Ball {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+        meet_sphere(ray, self.centre_m, self.radius_m)
+    }
+
+    fn normal_at(&self, point: DVec3, _part: u32) -> DVec3 {
+        (point - self.centre_m).normalize()
+    }
+
+    fn bend(&self, _point: DVec3, _part: u32, step_m: DVec3) -> DVec3 {
+        step_m / self.radius_m
+    }
+
+    /// Around the vertical axis at the equator, and down along the meridian.
+    fn on_surface(&self, point: DVec3, _part: u32, seen_turned_deg: f64) -> (f64, f64) {
+        let offset = turned_back(point - self.centre_m, seen_turned_deg);
+        let down = libm::asin((offset.y / self.radius_m).clamp(-1.0, 1.0));
+        let around = libm::atan2(offset.x, -offset.z);
+        (self.radius_m * around, self.radius_m * down)
+    }
+}
+
+/// A cylinder with flat ends, where it stands.
+#[derive(Debug)]
+pub(in crate::scene) struct Cylinder {
+    centre_m: DVec3,
+    /// Of unit length.
+    axis: DVec3,
+    radius_m: f64,
+    height_m: f64,
+}
+
+impl Cylinder {
+    pub(super) fn new(centre_m: DVec3, axis: DVec3, radius_m: f64, height_m: f64) -> Self {
+        Cylinder {
+            centre_m,
+            axis: axis.normalize(),
+            radius_m,
+            height_m,
+        }
+    }
+
+    fn off_axis(&self, vector: DVec3) -> DVec3 {
+        vector - self.axis * vector.dot(self.axis)
+    }
+}
+
+impl Surface for Cylinder {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+        let inside = pierced(ray, self.centre_m, self.axis, self.radius_m)?;
+        between_ends(ray, (self.centre_m, self.axis), self.height_m / 2.0, inside)
+    }
+
+    fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
+        match part {
+            SIDE => self.off_axis(point - self.centre_m).normalize(),
+            _ => self.axis,
+        }
+    }
+
+    fn bend(&self, _point: DVec3, part: u32, step_m: DVec3) -> DVec3 {
+        match part {
+            SIDE => self.off_axis(step_m) / self.radius_m,
+            _ => DVec3::ZERO,
+        }
+    }
+
+    /// Around the side and along it, or across an end.
+    fn on_surface(&self, point: DVec3, part: u32, seen_turned_deg: f64) -> (f64, f64) {
+        let offset = turned_back(point - self.centre_m, seen_turned_deg);
+        let axis = turned_back(self.axis, seen_turned_deg);
+        let (side, other) = axis.any_orthonormal_pair();
+        let (x, y) = (offset.dot(side), offset.dot(other));
+        match part {
+            SIDE => (self.radius_m * libm::atan2(y, x), offset.dot(axis)),
+            _ => (x, y),
+        }
+    }
 }
 
 /// Ranges at which a line enters and leaves the endless cylinder of `radius_m` about the axis (of unit length) through
@@ -40,17 +122,6 @@ fn pierced(ray: &Ray, from_m: DVec3, axis: DVec3, radius_m: f64) -> Option<(f64,
     }
     let square = b * b - a * c;
     (square >= 0.0).then(|| ((-b - square.sqrt()) / a, (-b + square.sqrt()) / a))
-}
-
-/// A cylinder with flat ends; `axis` has unit length.
-pub(super) fn meet_cylinder(
-    ray: &Ray,
-    centre_m: DVec3,
-    axis: DVec3,
-    (radius_m, height_m): (f64, f64),
-) -> Option<Meeting> {
-    let inside = pierced(ray, centre_m, axis, radius_m)?;
-    between_ends(ray, (centre_m, axis), height_m / 2.0, inside)
 }
 
 /// Where a ray meets what lies within an endless side, from `enter` to `leave` along the ray, and between two flat ends, `half_m` either way along
@@ -86,31 +157,6 @@ pub(super) fn between_ends(
     }
     let meeting = |(range_m, part)| in_front(range_m).map(|range_m| Meeting { range_m, part });
     meeting(first).or_else(|| meeting(last))
-}
-
-pub(super) fn cylinder_normal(offset: DVec3, axis: DVec3, part: u32) -> DVec3 {
-    match part {
-        SIDE => (offset - axis * offset.dot(axis)).normalize(),
-        _ => axis,
-    }
-}
-
-/// How the normal turns along a small step within the surface.
-pub(super) fn cylinder_bend(step_m: DVec3, axis: DVec3, radius_m: f64, part: u32) -> DVec3 {
-    match part {
-        SIDE => (step_m - axis * step_m.dot(axis)) / radius_m,
-        _ => DVec3::ZERO,
-    }
-}
-
-/// Around the side and along it, or across an end.
-pub(super) fn on_cylinder(offset: DVec3, axis: DVec3, radius_m: f64, part: u32) -> (f64, f64) {
-    let (side, other) = axis.any_orthonormal_pair();
-    let (x, y) = (offset.dot(side), offset.dot(other));
-    match part {
-        SIDE => (radius_m * libm::atan2(y, x), offset.dot(axis)),
-        _ => (x, y),
-    }
 }
 
 /// A cylinder whose ends are half balls, from `from_m` to `to_m`.

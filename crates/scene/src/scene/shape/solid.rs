@@ -3,7 +3,39 @@
 use glam::DVec3;
 
 use super::meeting::{Meeting, in_front};
+use super::pose::Pose;
+use super::surface::Surface;
 use crate::scene::vector::Ray;
+
+/// A box where it stands.
+#[derive(Debug)]
+pub(in crate::scene) struct Block {
+    pose: Pose,
+    size_m: DVec3,
+}
+
+impl Block {
+    pub(super) fn new(centre_m: DVec3, yaw_deg: f64, size_m: DVec3) -> Self {
+        Block {
+            pose: Pose::new(centre_m, yaw_deg),
+            size_m,
+        }
+    }
+}
+
+impl Surface for Block {
+    fn intersect(&self, ray: &Ray) -> Option<Meeting> {
+        meet_box(&self.pose.inwards(ray), self.size_m)
+    }
+
+    fn normal_at(&self, _point: DVec3, part: u32) -> DVec3 {
+        self.pose.outwards(face_normal(part))
+    }
+
+    fn on_surface(&self, point: DVec3, part: u32, _seen_turned_deg: f64) -> (f64, f64) {
+        on_face(self.pose.inside(point), part)
+    }
+}
 
 /// Slab method; `ray` is in the box's own coordinates. The part is the axis that the face looks along.
 pub(super) fn meet_box(ray: &Ray, size_m: DVec3) -> Option<Meeting> {

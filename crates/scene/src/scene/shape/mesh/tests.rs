@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::*;
 use crate::scene::Shape;
+use crate::scene::shape::Surface;
 use proptest::prelude::*;
 
 fn read(text: &str) -> Result<Mesh, InputError> {
