@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use guided_dtof::chip::{SensorConfig, Tap, Tdc};
+use guided_dtof::netlist::Corner;
 use guided_dtof::testbenches::TESTBENCHES;
 
 const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/waves");
@@ -108,6 +110,54 @@ fn a_testbench_of_its_own_prints_all_its_checks() {
         run.status.success() && text.contains(" checked, 0 failed"),
         "{text}"
     );
+}
+
+#[test]
+fn expectations_are_those_of_the_sensor_that_is_given() {
+    type Change = fn(&mut SensorConfig);
+    let sensors: [(&str, Change); 18] = [
+        ("clk_hz = 30e6", |sensor| sensor.clk_hz = 30e6),
+        ("clk_hz = 500e6", |sensor| sensor.clk_hz = 500e6),
+        ("corner = slow", |sensor| sensor.corner = Corner::Slow),
+        ("tap = msb", |sensor| sensor.tap = Tap::Msb),
+        ("tdc = counter", |sensor| sensor.tdc = Tdc::Counter),
+        ("counter_bits = 4", |sensor| sensor.counter_bits = 4),
+        ("counter_bits = 10", |sensor| sensor.counter_bits = 10),
+        ("stop_phase_ps = -1290", |s| s.stop_phase_ps = -1290.0),
+        ("stop_phase_ps = -1000", |s| s.stop_phase_ps = -1000.0),
+        ("stop_phase_ps = -300", |s| s.stop_phase_ps = -300.0),
+        ("stop_phase_ps = 1290", |s| s.stop_phase_ps = 1290.0),
+        ("bins = 2", |sensor| sensor.bins = 2),
+        ("bins = 64", |sensor| sensor.bins = 64),
+        ("clk_skew_ps = 150", |sensor| sensor.clk_skew_ps = 150.0),
+        ("spad_rows = 1", |sensor| sensor.spad_rows = 1),
+        ("one SPAD", |sensor| {
+            (sensor.spad_rows, sensor.spad_cols) = (1, 1);
+        }),
+        ("spad_rows = 8", |sensor| sensor.spad_rows = 8),
+        ("step_periods = 4", |sensor| {
+            (sensor.step_periods, sensor.clk_hz) = (4, 200e6);
+        }),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for (what, change) in sensors {
+        let mut sensor = SensorConfig::default();
+        change(&mut sensor);
+        for testbench in TESTBENCHES.iter().filter(|tb| tb.drives(&sensor)) {
+            let waves = folder.path().join("waves.vcd");
+            let checks = testbench.run(Some(&sensor), &waves).unwrap();
+            assert!(checks.passed(), "{what}, {}:\n{checks}", testbench.name);
+        }
+    }
+}
+
+#[test]
+fn a_sensor_whose_signals_race_is_refused_with_what_helps() {
+    let run = gdtof(&["tb", "macropixel", "--set", "sensor.step_periods=2"]);
+    assert_eq!(run.status.code(), Some(2));
+    let said = String::from_utf8(run.stderr).unwrap();
+    assert!(said.contains("the strobe meets"), "{said}");
+    assert!(said.contains("; give clk_hz of at most 383.6"), "{said}");
 }
 
 #[test]

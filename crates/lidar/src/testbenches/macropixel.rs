@@ -13,9 +13,10 @@ mod photons;
 use std::fmt::Debug;
 use std::path::Path;
 
-use crate::chip::window_law::OpenWindow;
+use crate::chip::window_law::{OpenWindow, WindowOutcome};
 use crate::chip::{
-    self, EventType, Exposure, Mode, Probe, SensorConfig, SensorPins, Tdc, WindowLaw, array, probes,
+    self, EventType, Exposure, Mode, Probe, Race, Sensor, SensorConfig, SensorPins, Tdc, WindowLaw,
+    array, probes,
 };
 use crate::engine::GateSimulation;
 use crate::engine::waveform::hits;
@@ -34,8 +35,13 @@ use crate::waves::{Entry, Layout, Mark, SignalGroup};
 const FIG_48: [u16; 2] = [52, 49];
 /// Start values of two macropixels of HSLIDAR, half a window apart.
 const HSLIDAR: [u16; 2] = [13, 12];
-/// CLK periods between two STOP edges.
+/// CLK periods between two STOP edges, where windows are short.
 const STOP_PERIODS: u32 = 64;
+
+/// CLK periods between two STOP edges that leave room for two windows.
+fn stop_periods(sensor: &SensorConfig) -> u32 {
+    STOP_PERIODS.max((sensor.bins + 3 * sensor.step_periods) as u32 + 40)
+}
 
 pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_macropixel",
@@ -92,7 +98,7 @@ fn window_starts(sensor: &SensorConfig) -> Result<[u16; 2], InputError> {
     if sensor.mode == Mode::Conventional {
         return refused("its macropixels have one window; give mode = \"guided\"");
     }
-    let exposure = Exposure::new(sensor, STOP_PERIODS, 1);
+    let exposure = Exposure::new(sensor, stop_periods(sensor), 1);
     // Windows share bins.
     let Some(apart) = [3, 2, 1]
         .into_iter()
@@ -121,10 +127,13 @@ fn window_starts(sensor: &SensorConfig) -> Result<[u16; 2], InputError> {
         .find(|starts| starts.iter().all(fits))
     {
         Some(starts) => Ok(starts),
-        None => refused(&format!(
-            "no two start values {apart} apart open windows of {} bins within {STOP_PERIODS} CLK periods; give fewer bins",
-            sensor.bins
-        )),
+        None => match race(sensor, &exposure) {
+            Some(race) => refused(&format!("{race}; {}", race.cure)),
+            None => refused(&format!(
+                "no two start values {apart} apart open windows of {} bins within {} CLK periods; give more counter_bits",
+                sensor.bins, exposure.stop_periods
+            )),
+        },
     }
 }
 
@@ -148,6 +157,22 @@ fn find_window(
     exposure: &Exposure,
     start: u16,
 ) -> Option<(WindowLaw, OpenWindow)> {
+    let law = built_in_law(config, exposure);
+    let window = law.window(start).open()?;
+    Some((law, window))
+}
+
+/// The signals that come too close to each other to tell a window.
+fn race(config: &SensorConfig, exposure: &Exposure) -> Option<Race> {
+    let law = built_in_law(config, exposure);
+    (0..=config.largest_start()).find_map(|start| match law.window(start) {
+        WindowOutcome::Race(race) => Some(race),
+        _ => None,
+    })
+}
+
+/// The law with the built-in blocks.
+fn built_in_law(config: &SensorConfig, exposure: &Exposure) -> WindowLaw {
     let built_in = SensorConfig {
         correlation_block: None,
         front_end_block: None,
@@ -155,9 +180,7 @@ fn find_window(
         histogram_block: None,
         ..config.clone()
     };
-    let law = WindowLaw::new(built_in, exposure);
-    let window = law.window(start).open()?;
-    Some((law, window))
+    WindowLaw::new(built_in, exposure)
 }
 
 /// The middle of a bin in one laser cycle.
@@ -202,7 +225,7 @@ fn two_windows(
         cols: 2,
         ..sensor.clone()
     };
-    let exposure = Exposure::new(&config, STOP_PERIODS, 6);
+    let exposure = Exposure::new(&config, stop_periods(&config), 6);
     let shift = usize::from(starts[0] - starts[1]) * config.step_periods;
     let (law, second) = window(&config, &exposure, starts[1]);
     let photons_of = |bin: i64| (bin * bin * bin + 3 * bin).rem_euclid(11) as u32 / 2;
@@ -255,7 +278,10 @@ fn two_windows(
         Some(h) => (&h[0][..config.bins - shift], &h[1][shift..]),
         None => (&[][..], &[][..]),
     };
-    let is_telling = later.iter().any(|&n| n != later[0]);
+    let is_telling = match later {
+        [one] => *one > 0,
+        _ => later.iter().any(|&n| n != later[0]),
+    };
     checks.add_verdict(
         format!(
             "bins 0 up of {} are bins {shift} up of {}",
@@ -269,27 +295,33 @@ fn two_windows(
         .iter()
         .map(|&net| recorder.rising_edges(net))
         .collect::<Vec<_>>();
+    let sensor = Sensor::from(config.clone());
+    let skew = |pixel: usize| sensor.clk_skew(pixel);
+    let beside = match skew(1) - skew(0) {
+        Time::ZERO => String::new(),
+        later => format!(" less {later} of skew"),
+    };
     for (cycle, (later, earlier)) in rises[0].iter().zip(&rises[1]).enumerate() {
         // Each edge of CLK is rounded to a femtosecond.
-        let expected = exposure.clock.periods(shift as i64);
+        let expected = exposure.clock.periods(shift as i64) - (skew(1) - skew(0));
         let found = *later - *earlier;
         checks.add_verdict(
             format!(
                 "laser cycle {cycle}: LOCAL_STOP {} before that of {}",
                 starts[1], starts[0]
             ),
-            format!("{shift} periods, {expected}"),
+            format!("{shift} periods{beside}, {expected}"),
             found,
             (found - expected).as_fs().abs() <= 1,
         );
     }
-    for (rises, start) in rises.iter().zip(starts) {
+    for (pixel, (rises, start)) in rises.iter().zip(starts).enumerate() {
         let what = format!("start value {start}: LOCAL_STOPs");
         checks.equal(what, exposure.laser_cycles as usize, rises.len());
         let (_, window) = window(&config, &exposure, start);
         let found: Vec<Time> = rises.iter().take(1).map(|&t| t - origin).collect();
         let what = format!("start value {start}: first LOCAL_STOP after STOP, by the law");
-        checks.times(what, window.strobe_cause, &found);
+        checks.times(what, window.strobe_cause + skew(pixel), &found);
     }
     Ok(())
 }

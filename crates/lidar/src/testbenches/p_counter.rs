@@ -170,6 +170,14 @@ impl Bench {
         rise
     }
 
+    /// The CLK fall after STOP that counts first: the reset pulse is over when it comes. It is fall 1, or where STOP comes well before CLK
+    /// falls, fall 0.
+    fn first_fall(&self, exposure: &Exposure) -> i64 {
+        let release = self.timing.stop_to_reset_release;
+        let is_late = |&k: &i64| exposure.falling(k) + self.timing.clk_to_counter_clk > release;
+        (0..).find(is_late).expect("CLK goes on")
+    }
+
     /// The COUNTER_CLK edge that raises LOCAL_STOP, the first one being 0.
     fn first_edge(&self, start: u64) -> Option<i64> {
         first_edge(&self.config, start)
@@ -239,6 +247,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         ..
     } = bench;
     let exposure = Exposure::new(&bench.config, stop_periods as u32, 5);
+    let first_fall = bench.first_fall(&exposure);
     let stop = |cycle: i64| origin + exposure.stop(cycle);
     let falling = |cycle: i64, k: i64| origin + exposure.falling(cycle * stop_periods + k);
     let round = (bench.config.step_periods as i64) << (bench.config.counter_bits + 1);
@@ -265,7 +274,13 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     }
     // CLK runs from the release of the reset on.
     let half_periods = 2 * (5 * stop_periods + hold_periods);
-    drives.clock(bench.clk, exposure.clock, origin, (-BEFORE, half_periods));
+    let clk_origin = origin - exposure.stop_phase;
+    drives.clock(
+        bench.clk,
+        exposure.clock,
+        clk_origin,
+        (-BEFORE, half_periods),
+    );
 
     let rig = &bench.rig;
     let (mut kernel, mut stimulus) = (rig.kernel(), drives.sorted());
@@ -289,11 +304,17 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         unknown_at_release,
     );
     checks.equal("changes to X after that", 0, unknowns.0);
+    let corner = bench.config.corner;
+    let flop = |pin, to| {
+        let cells = CellLibrary::BUILT_IN.cells();
+        cells.delay(CellKind::Dffr, pin, to, corner)
+    };
+    let clk_to_q = flop(1, Logic::One);
     for (value, rise) in loads {
         let Some([memory, counter_out]) = &bench.inner else {
             continue;
         };
-        let after = rise + timing.clk_to_shift;
+        let after = rise + clk_to_q;
         let found = (
             recorder.number_at(memory, after - Time::from_fs(1)),
             recorder.number_at(memory, after),
@@ -314,13 +335,9 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let found = clocked.iter().filter(disabled).count();
     checks.equal("COUNTER_CLK rises while disabled", 0, found);
 
-    let reset_to_q =
-        CellLibrary::BUILT_IN
-            .cells()
-            .delay(CellKind::Dffr, 2, Logic::Zero, bench.config.corner);
+    let reset_to_q = flop(2, Logic::Zero);
     let rises = recorder.rising_edges(bench.counter_reset);
     let releases = recorder.falling_edges(bench.counter_reset);
-    let half_period = exposure.clock.half_periods(1);
     for (cycle, start) in [
         (0, first_start),
         (1, first_start),
@@ -336,7 +353,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
             let what = format!("cycle {cycle}: COUNTER_OUT when COUNTER_RESET falls");
             checks.equal(what, number_text(Some(start)), number_text(found));
 
-            // Every count is read half a period after its edge, when the ripple is over.
+            // Every count is read when its ripple is over: before the next edge, the last one after the longest ripple.
             let mut model = p_counter::PCounterModel::new(&bench.config, start as u16);
             let expected = std::iter::from_fn(|| {
                 (!model.local_stop()).then(|| {
@@ -345,7 +362,10 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
                 })
             });
             let edges = clocked.iter().filter(within).filter(|t| **t > in_reset);
-            let found = edges.map(|&t| recorder.number_at(counter_out, t + half_period));
+            let edges: Vec<Time> = edges.copied().collect();
+            let settled = edges.iter().skip(1).map(|next| *next - Time::from_fs(1));
+            let settled = settled.chain(edges.last().map(|last| *last + timing.ripple()));
+            let found = settled.map(|time| recorder.number_at(counter_out, time));
             checks.equal(
                 format!("cycle {cycle}: COUNTER_OUT after each rise of COUNTER_CLK"),
                 in_a_row(expected),
@@ -364,12 +384,10 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
             found.len(),
         );
         let Some(first) = first else { continue };
-        let edge = falling(cycle, first + 1);
+        let fall = first_fall + first;
+        let edge = falling(cycle, fall);
         let expected = edge + timing.ripple() - stop(cycle);
-        let what = format!(
-            "cycle {cycle}: LOCAL_STOP rises after STOP, by CLK fall {}",
-            first + 1
-        );
+        let what = format!("cycle {cycle}: LOCAL_STOP rises after STOP, by CLK fall {fall}");
         bench.takes(what, checks, edge - stop(cycle), expected, &found);
         if cycle != 4 && waits {
             let expected = next + timing.stop_to_reset + reset_to_q;

@@ -25,6 +25,7 @@ pub(super) fn count_alike(bench: &Bench, checks: &mut Checks) {
         return;
     };
     let exposure = Exposure::new(&bench.config, stop_periods as u32, CYCLES as u32);
+    let fall = bench.first_fall(&exposure) + first;
     let mut drives = bench.power_up();
     bench.load(&mut drives, Time::from_ns(5), start);
     drives.set(origin, bench.enable, true);
@@ -38,7 +39,13 @@ pub(super) fn count_alike(bench: &Bench, checks: &mut Checks) {
     }
     let end = origin + exposure.stop(CYCLES);
     let half_periods = 2 * CYCLES * stop_periods;
-    drives.clock(bench.clk, exposure.clock, origin, (-BEFORE, half_periods));
+    let clk_origin = origin - exposure.stop_phase;
+    drives.clock(
+        bench.clk,
+        exposure.clock,
+        clk_origin,
+        (-BEFORE, half_periods),
+    );
     let mut recorder = Recorder::new([bench.local_stop]);
     bench.rig.run(drives, end, &mut recorder);
 
@@ -46,7 +53,7 @@ pub(super) fn count_alike(bench: &Bench, checks: &mut Checks) {
     let mut after = Vec::new();
     for cycle in 0..CYCLES {
         let [from, until] = [cycle, cycle + 1].map(|cycle| origin + exposure.stop(cycle));
-        let edge = origin + exposure.falling(cycle * stop_periods + first + 1);
+        let edge = origin + exposure.falling(cycle * stop_periods + fall);
         let rise = rises.iter().find(|&&rise| (from..until).contains(&rise));
         after.extend(rise.map(|&rise| rise - edge));
     }

@@ -1,7 +1,7 @@
 //! The ripple to LOCAL_STOP of every start value, and when a reset has put all outputs back (thesis 4.6, Fig. 56).
 
 use super::Bench;
-use crate::chip::{AfterBorrow, Exposure, SensorConfig};
+use crate::chip::{AfterBorrow, Exposure, SensorConfig, Tap};
 use crate::kernel::Recorder;
 use crate::report::Checks;
 use crate::units::Time;
@@ -13,22 +13,26 @@ pub(super) fn ripple(bench: &Bench, checks: &mut Checks) {
     let (config, timing) = (&bench.config, &bench.timing);
     let exposure = Exposure::new(config, 2, 1);
     let falling_clk = |period: i64| bench.origin + exposure.falling(period);
+    let stop_at = |period: i64| falling_clk(period) + exposure.stop_phase;
     let mut drives = bench.power_up();
-    let mut cycles = Vec::new();
+    let (mut cycles, mut loads) = (Vec::new(), Vec::new());
     let mut period = 0;
     for start in 0..=config.largest_start() as i64 {
-        drives.set(falling_clk(period), bench.enable, false);
-        bench.load(&mut drives, falling_clk(period), start as u64);
+        let disabled = stop_at(period);
+        drives.set(disabled, bench.enable, false);
+        bench.load(&mut drives, disabled, start as u64);
         period += LOAD_PERIODS;
-        drives.set(falling_clk(period), bench.enable, true);
+        drives.set(stop_at(period), bench.enable, true);
+        loads.push(disabled..stop_at(period));
         for _ in 0..2 {
-            drives.pulse(bench.stop, falling_clk(period), falling_clk(period + 1));
+            drives.pulse(bench.stop, stop_at(period), stop_at(period + 1));
             let first = bench.first_edge(start as u64);
             cycles.extend(first.map(|first| (first, period)));
             period += first.unwrap_or(0) + AFTER_BORROW;
         }
     }
-    drives.clock(bench.clk, exposure.clock, bench.origin, (0, 2 * period));
+    let clk_origin = bench.origin - exposure.stop_phase;
+    drives.clock(bench.clk, exposure.clock, clk_origin, (0, 2 * period));
     let counter_out = bench.inner.iter().flat_map(|[_, out]| out.iter().copied());
     let mut recorder = Recorder::new(counter_out.chain([bench.local_stop]));
     bench.rig.run(drives, falling_clk(period), &mut recorder);
@@ -37,8 +41,12 @@ pub(super) fn ripple(bench: &Bench, checks: &mut Checks) {
     if config.after_borrow == AfterBorrow::Wrap {
         // Of each laser cycle the first: a short counter comes round before the next STOP.
         let mut last = None;
-        let cycle_of = |t: &Time| cycles.partition_point(|&(_, stop)| falling_clk(stop) <= *t);
+        let cycle_of = |t: &Time| cycles.partition_point(|&(_, stop)| stop_at(stop) <= *t);
         rises.retain(|rise| last.replace(cycle_of(rise)) != Some(cycle_of(rise)));
+    }
+    if config.tap == Tap::Msb {
+        // It follows what is loaded.
+        rises.retain(|rise| !loads.iter().any(|load| load.contains(rise)));
     }
     let expected = cycles.len();
     let what = format!(
@@ -46,10 +54,12 @@ pub(super) fn ripple(bench: &Bench, checks: &mut Checks) {
         config.largest_start()
     );
     checks.equal(what, expected, rises.len());
-    let ripple =
-        |(&rise, &(first, stop)): (&Time, &(i64, i64))| rise - falling_clk(stop + first + 1);
+    let first_fall = bench.first_fall(&exposure);
+    let ripple = |(&rise, &(first, stop)): (&Time, &(i64, i64))| {
+        rise - falling_clk(stop + first_fall + first)
+    };
     let ripples: Vec<Time> = rises.iter().zip(&cycles).map(ripple).collect();
-    let what = "ripple, CLK fall start + 1 to LOCAL_STOP, of all";
+    let what = format!("ripple, CLK fall start + {first_fall} to LOCAL_STOP, of all");
     bench.takes(what, checks, Time::ZERO, timing.ripple(), &ripples);
     if bench.inner.is_none() {
         return;
@@ -69,9 +79,10 @@ pub(super) fn ripple(bench: &Bench, checks: &mut Checks) {
 
     // Outputs on their way back to the start value are edges for the next stage, too.
     let last_change = |stop: i64| {
-        let stop = falling_clk(stop);
+        let (stop, first_count) = (stop_at(stop), falling_clk(stop + first_fall));
         let changes = recorder.changes();
-        let until = changes.partition_point(|c| c.0 <= stop + exposure.clock.half_periods(1));
+        let until = first_count.min(stop + exposure.clock.half_periods(1));
+        let until = changes.partition_point(|c| c.0 <= until);
         let back = changes[..until]
             .iter()
             .rev()
