@@ -121,7 +121,7 @@ fn expectations_are_those_of_the_sensor_that_is_given() {
         ("corner = slow", |sensor| sensor.corner = Corner::Slow),
         ("tap = msb", |sensor| sensor.tap = Tap::Msb),
         ("tdc = counter", |sensor| sensor.tdc = Tdc::Counter),
-        ("counter_bits = 4", |sensor| sensor.counter_bits = 4),
+        ("counter_bits = 5", |sensor| sensor.counter_bits = 5),
         ("counter_bits = 10", |sensor| sensor.counter_bits = 10),
         ("stop_phase_ps = -1290", |s| s.stop_phase_ps = -1290.0),
         ("stop_phase_ps = -1000", |s| s.stop_phase_ps = -1000.0),
