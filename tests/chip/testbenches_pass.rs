@@ -122,7 +122,9 @@ fn expectations_are_those_of_the_sensor_that_is_given() {
         ("tap = msb", |sensor| sensor.tap = Tap::Msb),
         ("tdc = counter", |sensor| sensor.tdc = Tdc::Counter),
         ("counter_bits = 5", |sensor| sensor.counter_bits = 5),
-        ("counter_bits = 10", |sensor| sensor.counter_bits = 10),
+        ("counter_bits = 11", |sensor| {
+            (sensor.counter_bits, sensor.clk_hz) = (11, 300e6);
+        }),
         ("stop_phase_ps = -1290", |s| s.stop_phase_ps = -1290.0),
         ("stop_phase_ps = -1000", |s| s.stop_phase_ps = -1000.0),
         ("stop_phase_ps = -300", |s| s.stop_phase_ps = -300.0),
