@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use guided_dtof::ranging::DepthOptions;
+use guided_dtof::ranging::{DepthOptions, WalkLeft};
 use guided_dtof::request::{Spelling, check_false_alarm_rate, guided_exposure, read_calibration};
 use guided_dtof::system::{self, NoDepth};
 use numpy::PyReadonlyArrayDyn;
@@ -81,5 +81,7 @@ pub(crate) fn range_counts<'py>(
         .map(|r| NoDepth::number(r.no_depth))
         .collect();
     dict.set_item("reason", map(py, shape, reasons))?;
+    let walk_left = readings.iter().map(|r| WalkLeft::number(r.walk_left));
+    dict.set_item("walk_left", map(py, shape, walk_left.collect()))?;
     Ok(dict)
 }

@@ -3,6 +3,7 @@
 use guided_dtof::files::{parse_toml, read_text};
 use guided_dtof::ranging::{
     Agreement, DepthOptions, DetectedReturn, Detector, DetectorDescription, NoReturn, SurfaceLight,
+    WalkLeft,
 };
 use guided_dtof::request::{Spelling, check_false_alarm_rate};
 use guided_dtof::system::RETURNS;
@@ -147,6 +148,11 @@ pub(crate) fn detector_range<'py>(
         });
         dict.set_item(name, map(py, (found.len(), RETURNS), returns.collect()))?;
     }
+    let walk_left = found.iter().map(|found| {
+        let first = found.as_deref().unwrap_or_default().first();
+        WalkLeft::number(first.and_then(|of| of.no_bound))
+    });
+    dict.set_item("walk_left", map(py, (found.len(), 1), walk_left.collect()))?;
     let reason = |found: &Result<_, NoReturn>| match found {
         Ok(_) => String::new(),
         Err(why) => why.to_string(),

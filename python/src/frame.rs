@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use guided_dtof::chip::{Exposure, Sensor as Chip, WindowLaw};
 use guided_dtof::engine::waveform::WaveCycles;
+use guided_dtof::ranging::WalkLeft;
 use guided_dtof::request::FrameRequest;
 use guided_dtof::scene::PinholeCamera;
 use guided_dtof::system::{
@@ -105,6 +106,8 @@ impl Common {
         dict.set_item("confidence", metres(|p| p.confidence))?;
         let reasons = pixels.iter().map(|p| NoDepth::number(p.no_depth)).collect();
         dict.set_item("reason", map(py, shape, reasons))?;
+        let walk_left = pixels.iter().map(|p| WalkLeft::number(p.walk_left));
+        dict.set_item("walk_left", map(py, shape, walk_left.collect()))?;
         let starts = pixels.iter().map(|p| of_start(p.start)).collect();
         dict.set_item("start", map(py, shape, starts))?;
         let in_window = pixels.iter().map(|p| p.in_window).collect();

@@ -29,6 +29,7 @@ mod theory;
 mod timing;
 mod values;
 
+use guided_dtof::ranging::WalkLeft;
 use guided_dtof::report::DEPTH_COLOURS;
 use guided_dtof::system::{NoDepth, frame_scale_m};
 use pyo3::prelude::*;
@@ -88,6 +89,8 @@ mod _gdtof {
         let categories = NoDepth::categories();
         let reasons = categories.map(|category| category.name);
         module.add("REASONS", PyTuple::new(module.py(), reasons)?)?;
+        let walks = WalkLeft::ALL.map(WalkLeft::name);
+        module.add("WALKS_LEFT", PyTuple::new(module.py(), walks)?)?;
         let patterns = categories.map(|category| category.pattern.levels().map(<[u8; 4]>::into));
         let patterns = patterns.map(|rows: [(u8, u8, u8, u8); 4]| <(_, _, _, _)>::from(rows));
         module.add("PATTERNS", PyTuple::new(module.py(), patterns)?)?;

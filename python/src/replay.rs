@@ -49,6 +49,7 @@ pub(crate) fn replay<'py>(
     }
     let farthest = sensor.largest_start();
     let starts = start_values(&starts, &[sensor.rows, sensor.cols], farthest)?;
+    let is_on: Vec<bool> = starts.iter().map(Option::is_some).collect();
     let starts: Vec<u16> = starts
         .into_iter()
         .map(|start| start.unwrap_or(farthest))
@@ -58,7 +59,9 @@ pub(crate) fn replay<'py>(
     let (recording, histograms, cancel) = run(py, progress, move |watch| {
         let recording = Recording::from_events(events, &sensor, &exposure);
         watch.check()?;
-        let pulses: Vec<&[SpadEvent]> = recording.pulses.iter().map(Vec::as_slice).collect();
+        let pulses = recording.pulses.iter().zip(&is_on);
+        let pulses = pulses.map(|(pulses, is_on)| if *is_on { &pulses[..] } else { &[] });
+        let pulses: Vec<&[SpadEvent]> = pulses.collect();
         let pixels = PulsedPixel::array(&starts, &pulses);
         let engine = kind.replay(&sensor, &exposure)?;
         let histograms = match &waves {

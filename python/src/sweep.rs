@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use guided_dtof::files::{InputError, ResultSet};
-use guided_dtof::sweep::{Results, Shard, Study, SweepError, run as take_points, study_of};
+use guided_dtof::sweep::{
+    Results, Shard, Study, SweepError, TableCell, run as take_points, study_of,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -80,25 +82,49 @@ pub(crate) fn sweep_part<'py>(
     by_json(py, &outcome)
 }
 
-/// Writes the table of all rows in a folder; how many points have none.
+/// Writes the table of all rows in a folder; how many points have none, how many of the rows have no result, and why, if no row has one.
 #[pyfunction]
 pub(crate) fn sweep_table<'py>(py: Python<'py>, folder: PathBuf) -> PyResult<Bound<'py, PyDict>> {
-    let (points, missing) = run(py, None, move |_| Ok(write(&folder)?))?;
+    let written = run(py, None, move |_| Ok(write(&folder)?))?;
     let dict = PyDict::new(py);
-    dict.set_item("points", points)?;
-    dict.set_item("missing", missing)?;
+    dict.set_item("points", written.points)?;
+    dict.set_item("missing", written.missing)?;
+    dict.set_item("without_results", written.without_results)?;
+    let has_none = written.missing + written.without_results == written.points;
+    dict.set_item("fault", written.fault.filter(|_| has_none))?;
     Ok(dict)
 }
 
-fn write(folder: &Path) -> Result<(u64, u64), SweepError> {
+/// A table that has been written.
+struct Written {
+    points: u64,
+    missing: u64,
+    without_results: u64,
+    /// Of the first row that has no result.
+    fault: Option<String>,
+}
+
+fn write(folder: &Path) -> Result<Written, SweepError> {
     let study = study_of(folder)?;
     let set = ResultSet::begin(folder, "sweep")?;
     let results = Results::read(&study, &[folder.to_owned()])?;
-    let missing = results.write(set.staging(), |_| ())?;
+    let (mut without_results, mut fault) = (0, None);
+    let missing = results.write(set.staging(), |cells| {
+        // The last column says why there is no result.
+        if let Some(TableCell::Word(why)) = cells.last() {
+            without_results += 1;
+            fault.get_or_insert_with(|| why.clone());
+        }
+    })?;
     let configuration = serde_json::json!({
         "study": study.text(),
         "points": study.len() - missing,
     });
     set.commit(configuration)?;
-    Ok((study.len(), missing))
+    Ok(Written {
+        points: study.len(),
+        missing,
+        without_results,
+        fault,
+    })
 }

@@ -110,7 +110,14 @@ fn formula(name: &str, words: &[String]) -> Result<(usize, Formula), Failure> {
             (4, boxed(laser_cycles))
         }
         "thompson" => (4, boxed(|r| precision::thompson(r[0], r[1], r[2], r[3]))),
-        "cramer_rao" => (4, boxed(|r| precision::cramer_rao(r[0], r[1], r[2], r[3]))),
+        "cramer_rao" => {
+            // The library's is the greatest number where nothing is told, so that searches may go on.
+            let bound = |r: &[f64]| match precision::cramer_rao(r[0], r[1], r[2], r[3]) {
+                f64::MAX => f64::INFINITY,
+                bound => bound,
+            };
+            (4, boxed(bound))
+        }
         "thompson_best_ratio" => (2, boxed(|r| precision::thompson_best_ratio(r[0], r[1]))),
         "cramer_rao_laser_cycles" => (
             5,

@@ -90,7 +90,7 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
     let sensor = sensor.as_deref();
     let testbenches = chosen(&args.names, sensor)?;
     let has_library = sensor.is_some_and(|sensor| !sensor.liberty.as_os_str().is_empty());
-    if has_library && testbenches.iter().any(|tb| tb.name == "p_counter") {
+    if has_library && testbenches.iter().any(|tb| tb.name == "tb_p_counter") {
         note(
             "p_counter runs with the built-in delays, whatever the library; `gdtof timing` has the ripple in the library's cells",
         );
@@ -143,7 +143,7 @@ fn chosen(names: &[String], sensor: Option<&SensorConfig>) -> Result<Vec<Testben
         return Err(InputError::new("--block", message));
     }
     if names.is_empty() {
-        return Ok(driving);
+        return able(driving, sensor);
     }
     let mut chosen: Vec<Testbench> = Vec::new();
     for name in names {
@@ -160,6 +160,28 @@ fn chosen(names: &[String], sensor: Option<&SensorConfig>) -> Result<Vec<Testben
         }
     }
     Ok(chosen)
+}
+
+/// Those that can drive the sensor; of the others it is noted why they cannot.
+///
+/// # Errors
+/// Why the first cannot, if none can.
+fn able(
+    driving: Vec<Testbench>,
+    sensor: Option<&SensorConfig>,
+) -> Result<Vec<Testbench>, InputError> {
+    let (mut able, mut refusals) = (Vec::new(), Vec::new());
+    for testbench in driving {
+        match sensor.map_or(Ok(()), |sensor| testbench.check(sensor)) {
+            Ok(()) => able.push(testbench),
+            Err(refusal) => refusals.push(refusal),
+        }
+    }
+    if able.is_empty() {
+        return Err(refusals.swap_remove(0));
+    }
+    refusals.iter().for_each(note);
+    Ok(able)
 }
 
 impl Entry {

@@ -10,7 +10,7 @@ Distances are metres along the ray, NaN where there is none; arrays by macropixe
 """
 
 from . import errors, theory, waves
-from ._arrays import Reason
+from ._arrays import Reason, WalkLeft
 from ._detector import Agreement, Coincidence, Detected, Detector
 from ._frame import Drive, DriveFrame, Frame, Hint, Maps, drive, frame
 from ._gdtof import Guide, Problem, Scene, Sensor, __version__
@@ -40,6 +40,7 @@ __all__ = [
     "Problem",
     "Ranged",
     "Reason",
+    "WalkLeft",
     "Replayed",
     "Scene",
     "Sensor",

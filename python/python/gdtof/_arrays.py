@@ -9,13 +9,16 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ._gdtof import REASONS
+from ._gdtof import REASONS, WALKS_LEFT
 from .errors import InputError
 
 Map: TypeAlias = Literal["depth", "guide", "truth", "peak", "error", "confidence", "reason", "counts"]
 
 REASON_NAMES = ("depth", *REASONS)
 """By :class:`Reason`."""
+
+WALK_LEFT_NAMES = ("none", *WALKS_LEFT)
+"""By :class:`WalkLeft`."""
 
 SPEED_OF_LIGHT_M_PER_S = 299_792_458.0
 
@@ -41,6 +44,33 @@ class Reason(IntEnum):
     """The surface lies in the window, and no peak is significant."""
     BEHIND_LIDAR = 8
     """The echo seems to come from behind the lidar, by more than its bound."""
+
+
+class WalkLeft(IntEnum):
+    """Why a depth has no bound: range walk is left in it, or was taken out to a bin only."""
+
+    NONE = 0
+    """Nothing is left, or there is no depth."""
+    DELAY_LINE = 1
+    """On the line that a delay line's SPADs share photons cancel."""
+    COUNTER_TDC = 2
+    """A counter TDC adds up SPADs."""
+    JOINED_SPADS = 3
+    """The front end joins SPADs on one line."""
+    SHORT_LASER_CYCLE = 4
+    """SPADs have not recovered from one echo before the window opens again."""
+    PULSE_SHAPE = 5
+    """The laser pulse is measured, and no Gaussian."""
+    NOT_ONE_ECHO = 6
+    """The counts are not those of one echo of the laser pulse."""
+    CUT_ECHO = 7
+    """The echo's centre lies outside the window, and what is within does not tell its width."""
+    TO_A_BIN = 8
+    """The counts tell only the bin; the bound is one."""
+    AMBIGUOUS = 9
+    """Two different lights give such counts."""
+    NOT_CONVERGED = 10
+    """No most likely light was found."""
 
 
 def reason_name(reason: Reason) -> str:
@@ -79,6 +109,8 @@ class FrameArrays:
     """-log10 of the chance that light without an echo makes such a peak; NaN where there is no peak."""
     reason: NDArray[np.uint8]
     """Why there is no depth, a :class:`Reason`; 0 where there is one."""
+    walk_left: NDArray[np.uint8]
+    """Why a depth has no bound, or one of a bin, a :class:`WalkLeft`; 0 elsewhere."""
     start: NDArray[np.int32]
     """Start value of the P-counter; -1 where SPADs are off."""
     in_window: NDArray[np.bool_]

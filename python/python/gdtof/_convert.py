@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._arrays import FrameArrays, Reason, reason_name
+from ._arrays import WALK_LEFT_NAMES, FrameArrays, Reason, WalkLeft, reason_name
 from ._gdtof import __version__
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ MAPS = {
     "peak": ("distance of the histogram's peak with its range walk", "m"),
     "confidence": ("-log10 of the chance of such a peak without an echo", "1"),
     "reason": ("why there is no depth", "1"),
+    "walk_left": ("why a depth has no bound", "1"),
     "start": ("start value of the P-counter, -1 where SPADs are off", "1"),
     "in_window": ("whether the echo lies in the time window", "1"),
 }
@@ -40,6 +41,8 @@ def to_xarray(frame: FrameArrays, described: dict[str, Any], placed: dict[str, A
     }
     variables["reason"][2]["flag_values"] = np.array(list(Reason), np.uint8)
     variables["reason"][2]["flag_meanings"] = " ".join(reason.name.lower() for reason in Reason)
+    variables["walk_left"][2]["flag_values"] = np.array(list(WalkLeft), np.uint8)
+    variables["walk_left"][2]["flag_meanings"] = " ".join(why.name.lower() for why in WalkLeft)
     counts = {"long_name": "counts", "units": "1"}
     variables["histograms"] = (("row", "col", "bin"), frame.histograms, counts)
     edges = {"long_name": "edges of the bins after STOP", "units": "ns"}
@@ -60,11 +63,13 @@ def to_pandas(frame: FrameArrays) -> pandas.DataFrame:
     except ImportError as error:
         raise ImportError("tables need pandas; pip install 'gdtof[pandas]'") from error
     rows, cols, _ = frame.shape
-    columns = {name: getattr(frame, name).ravel() for name in MAPS if name != "reason"}
+    columns = {name: getattr(frame, name).ravel() for name in MAPS if name not in ("reason", "walk_left")}
     columns["counts"] = frame.counts.ravel()
     index = pandas.MultiIndex.from_product([np.arange(rows), np.arange(cols)], names=["row", "col"])
     table: pandas.DataFrame = pandas.DataFrame(columns, index=index)
     names = pandas.Index([reason_name(reason) for reason in Reason])
     codes = frame.reason.ravel().astype(np.int64)
     table["reason"] = pandas.Categorical.from_codes(codes, categories=names)
+    walks = frame.walk_left.ravel().astype(np.int64)
+    table["walk_left"] = pandas.Categorical.from_codes(walks, categories=pandas.Index(WALK_LEFT_NAMES))
     return table

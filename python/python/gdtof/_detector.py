@@ -37,6 +37,8 @@ class Detected:
     """Their photons."""
     reason: NDArray[np.str_]
     """Why there is no depth; empty where there is one."""
+    walk_left: NDArray[np.uint8]
+    """Why a depth has no bound, or one of a bin, a :class:`WalkLeft`; 0 elsewhere."""
 
     def __repr__(self) -> str:
         return f"<Detected: {np.count_nonzero(np.isfinite(self.depth))} depths of {self.depth.size} zones>"
@@ -55,7 +57,8 @@ class Agreement(NamedTuple):
 
 def _rows(counts: Any) -> Any:
     """Tables of pandas and Arrow as arrays: with a column for each bin, or one column of lists."""
-    if hasattr(counts, "to_pandas"):
+    # Arrays of xarray have it, too, for two axes.
+    if hasattr(counts, "to_pandas") and not hasattr(counts, "__array__"):
         counts = counts.to_pandas()
     if np.ma.isMaskedArray(counts):
         return counts
@@ -128,6 +131,9 @@ class Detector:
             raise InputError(f"bins: {self.bins} is impossible; give 2 to 65536")
         if self.first_of is not None and self.laser_cycles is not None:
             raise InputError("laser_cycles: says the same as first_of; leave one of them out")
+        if self.bin_edges_ns is not None:
+            edges = np.asarray(self.bin_edges_ns, np.float64)
+            object.__setattr__(self, "bin_edges_ns", tuple(edges.ravel().tolist()))
         _gdtof.detector_checked(self._described())
 
     @classmethod
@@ -160,7 +166,7 @@ class Detector:
         together = self.coincidence
         keys = {
             "bin_width_ns": self.bin_ns,
-            "bin_edges_ns": None if self.bin_edges_ns is None else np.asarray(self.bin_edges_ns, np.float64).tolist(),
+            "bin_edges_ns": self.bin_edges_ns,
             "start_ns": self.start_ns,
             "pulse_fwhm_ns": self.pulse_fwhm_ns,
             "counts": "every" if self.first_of is None else "first",
@@ -257,6 +263,7 @@ class Detector:
             returns_bound=of_all("bound"),
             returns_photons=of_all("photons"),
             reason=np.array(found["reason"], dtype=np.str_).reshape(shape),
+            walk_left=found["walk_left"].reshape(shape),
         )
 
     def expected(self, depth_m: float, photons: float, background: float = 0.0) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ __all__ = [
     "DEPTH_COLOURS",
     "PATTERNS",
     "REASONS",
+    "WALKS_LEFT",
     "Drive",
     "Guide",
     "Problem",
@@ -49,6 +50,7 @@ __version__: str
 DEPTH_COLOURS: tuple[tuple[int, int, int], ...]
 PATTERNS: tuple[tuple[tuple[int, int, int, int], ...], ...]
 REASONS: tuple[str, ...]
+WALKS_LEFT: tuple[str, ...]
 
 @final
 class Problem:

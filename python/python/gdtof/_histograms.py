@@ -71,6 +71,8 @@ class Ranged:
     """-log10 of the chance that light without an echo makes such a peak; NaN where there is no peak."""
     reason: NDArray[np.uint8]
     """A :class:`Reason`: depth, no guide (SPADs are off), saturated, no significant peak, or an echo from behind the lidar."""
+    walk_left: NDArray[np.uint8]
+    """Why a depth has no bound, or one of a bin, a :class:`WalkLeft`; 0 elsewhere."""
 
     def __repr__(self) -> str:
         return f"<Ranged: {np.count_nonzero(np.isfinite(self.depth))} depths of {self.depth.size} macropixels>"

@@ -80,7 +80,7 @@ def sweep(
     Raises
     ------
     InputError
-        What cannot be in the study, all at once with their lines.
+        What cannot be in the study, all at once with their lines. Why the first point has no result, if no point has one.
     """
     if isinstance(study, dict):
         # Where it would stand as a file.
@@ -99,8 +99,10 @@ def sweep(
     written = _gdtof.sweep_table(where)
     if written["missing"]:
         raise InputError(f"{where}: {written['missing']} of {points} points have no row; sweep again")
-    counts = {key: sum(o[key] for o in outcomes) for key in ("reused", "taken", "without_results")}
-    return Swept(where, points, **counts)
+    if written["fault"] is not None:
+        raise InputError(f"{where}: no point has a result: {written['fault']}")
+    counts = {key: sum(o[key] for o in outcomes) for key in ("reused", "taken")}
+    return Swept(where, points, **counts, without_results=written["without_results"])
 
 
 def _take(study: tuple[Path, str | None], folder: Path, part: int, of: int) -> dict[str, Any]:

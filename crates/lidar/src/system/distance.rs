@@ -25,8 +25,8 @@ pub struct DistanceLaw {
 }
 
 /// How a position becomes a distance.
-const OF_EQUAL_BINS: &str = "peak_m = speed_of_light_m_per_s / 2 * (window_opens_s[start] + (position_bins + 0.5) * bin_width_s)";
-const OF_EDGES: &str = "peak_m = speed_of_light_m_per_s / 2 * (bin_edges_s[start][b] + f * (bin_edges_s[start][b + 1] - bin_edges_s[start][b])), where b is the whole number and f the rest of position_bins + 0.5";
+const OF_EQUAL_BINS: &str = "peak_m = speed_of_light_m_per_s / 2 * (window_opens_s[start] + (position_bins + 0.5) * bin_width_s), where position_bins is 0 in the middle of the first bin";
+const OF_EDGES: &str = "peak_m = speed_of_light_m_per_s / 2 * (bin_edges_s[start][b] + f * (bin_edges_s[start][b + 1] - bin_edges_s[start][b])), where position_bins is 0 in the middle of the first bin, and b the whole number and f the rest of position_bins + 0.5";
 
 impl DistanceLaw {
     /// The law for macropixels with these start values. Those whose window never opens are left out.

@@ -15,8 +15,8 @@ mod start_values;
 use std::path::{Path, PathBuf};
 
 use crate::chip::{
-    AfterBorrow, CellLibrary, ChipTiming, Exposure, PCounter, Probe, Probes, SensorConfig, Tap,
-    p_counter, p_counter_timing,
+    AfterBorrow, CellLibrary, ChipTiming, Exposure, PCounter, Probe, Probes, SensorConfig, Silicon,
+    Tap, p_counter, p_counter_timing,
 };
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -41,8 +41,12 @@ const HOLD_PERIODS: i64 = 76;
 const ORIGIN: Time = Time::from_ns(20);
 /// Half periods of CLK before it.
 const BEFORE: i64 = 12;
-/// When the chip comes out of reset.
+/// When the chip comes out of reset, or later where the chain of the reset pulse takes longer to fill.
 const RESET_END: Time = Time::from_ns(2);
+/// From there to the first load.
+const TO_LOAD: Time = Time::from_ns(3);
+/// What a load takes after STOP, at most.
+const LOADED: Time = Time::from_ns(14);
 
 pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_p_counter",
@@ -50,6 +54,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     run,
     given: Some(GivenSensor {
         blocks: &["p_counter"],
+        check,
         run: run_on,
     }),
 };
@@ -58,13 +63,17 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     run_on(&SensorConfig::default(), waves, checks)
 }
 
+fn check(sensor: &SensorConfig) -> Result<(), InputError> {
+    if sensor.p_counter.row().has_memory {
+        return Ok(());
+    }
+    let message = "has no reset, which tb_p_counter needs; give another sensor.p_counter, or run tb_p_counter_variants without a sensor";
+    Err(InputError::new("p_counter = \"memoryless\"", message))
+}
+
 /// The P-counter of a sensor, with the built-in delays. Of any but the built-in ripple counter, static timing bounds the delays,
 /// and nothing inside is checked.
 fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    if !sensor.p_counter.row().has_memory {
-        let message = "has no reset, which tb_p_counter needs; give another sensor.p_counter, or run tb_p_counter_variants without a sensor";
-        return Err(InputError::new("p_counter = \"memoryless\"", message));
-    }
     let bench = Bench::new(sensor);
     if let Some(law) = sensor.counter_law() {
         let uneven = law
@@ -88,7 +97,13 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
 struct Bench {
     config: SensorConfig,
     timing: ChipTiming,
+    /// How much slower cells are than at 50 °C.
+    factor: f64,
     rig: Rig,
+    /// When the chip comes out of reset.
+    reset_end: Time,
+    /// The CLK fall after STOP that counts first.
+    first_fall: i64,
     clk: NetId,
     stop: NetId,
     resetb: NetId,
@@ -115,19 +130,29 @@ impl Bench {
             liberty_fast: PathBuf::new(),
             ..sensor.clone()
         };
-        let largest = u64::from(config.largest_start());
+        // Of greater ones the msb is high from the load on.
+        let largest = match config.tap {
+            Tap::Msb => (1 << (config.counter_bits - 1)) - 1,
+            Tap::Borrow => u64::from(config.largest_start()),
+        };
         let starts = [FIG_54[0].min(largest - 1), FIG_54[1].min(largest)];
         let last = starts
             .into_iter()
             .filter_map(|start| first_edge(&config, start))
             .max();
-        let before = Exposure::new(&config, 1, 1).clock.half_periods(BEFORE);
+        let exposure = Exposure::new(&config, 1, 1);
+        let before = exposure.clock.half_periods(BEFORE);
+        let timing = ChipTiming::new(&config);
+        let reset_end = RESET_END.max(timing.stop_to_reset_release + Time::from_ns(1));
+        let loaded = (LOADED.as_s() * config.clk_hz).ceil() as i64;
+        let first_fall = first_fall(&timing, &exposure);
         let is_known = config.p_counter == PCounter::Ripple
             && config.tap == Tap::Borrow
             && config.after_borrow == AfterBorrow::Hold
             && config.step_periods == 1
             && config.p_counter_block.is_none();
-        let rig = circuit(&config);
+        let silicon = Silicon::new(&config);
+        let rig = circuit(&config, &silicon);
         let probes = Probes::below_instance(&rig.netlist, "");
         let net = |probe| probes.net(probe);
         Bench {
@@ -139,24 +164,30 @@ impl Bench {
             load: net(Probe::MemoryLoad),
             counter_reset: net(Probe::CounterReset),
             counter_clk: net(Probe::CounterClk),
-            origin: ORIGIN.max(RESET_END + Time::from_ns(2) + before),
+            reset_end,
+            first_fall,
+            origin: ORIGIN.max(reset_end + Time::from_ns(2) + before),
             starts,
-            stop_periods: STOP_PERIODS.max(last.unwrap_or(0) + 5),
+            stop_periods: STOP_PERIODS
+                .max(last.unwrap_or(0) + 2 * first_fall + 3)
+                .max(2 * first_fall + 4)
+                .max(loaded),
             inner: is_known
                 .then(|| [Probe::Memory, Probe::CounterOut].map(|p| probes.bus(p).to_vec())),
             local_stop: net(Probe::LocalStop),
-            timing: ChipTiming::new(&config),
+            timing,
+            factor: silicon.factor,
             config,
             rig,
         }
     }
 
-    /// Power-up: everything low but CLK, and RESETB released at [`RESET_END`].
+    /// Power-up: everything low but CLK, and RESETB released.
     fn power_up(&self) -> Drives {
         let pins = [self.stop, self.resetb, self.enable, self.load];
         let mut drives = Drives::low(self.init.iter().copied().chain(pins));
         drives.set(Time::ZERO, self.clk, true);
-        drives.set(RESET_END, self.resetb, true);
+        drives.set(self.reset_end, self.resetb, true);
         drives
     }
 
@@ -168,14 +199,6 @@ impl Bench {
         drives.number(rise + Time::from_ns(1), &self.init, !code);
         drives.pulse(self.load, rise, rise + Time::from_ns(2));
         rise
-    }
-
-    /// The CLK fall after STOP that counts first: the reset pulse is over when it comes. It is fall 1, or where STOP comes well before CLK
-    /// falls, fall 0.
-    fn first_fall(&self, exposure: &Exposure) -> i64 {
-        let release = self.timing.stop_to_reset_release;
-        let is_late = |&k: &i64| exposure.falling(k) + self.timing.clk_to_counter_clk > release;
-        (0..).find(is_late).expect("CLK goes on")
     }
 
     /// The COUNTER_CLK edge that raises LOCAL_STOP, the first one being 0.
@@ -204,12 +227,22 @@ impl Bench {
     }
 }
 
+/// The CLK fall after STOP that counts first: the reset pulse is over when it comes. Usually it is fall 1; where STOP comes well before CLK
+/// falls, fall 0.
+fn first_fall(timing: &ChipTiming, exposure: &Exposure) -> i64 {
+    let counter = &timing.counter;
+    let released = timing.stop_to_reset_release + counter.release + counter.recovery;
+    let ready = released.max(timing.stop_to_reset + counter.settle);
+    let counts = |&k: &i64| exposure.falling(k) + timing.clk_to_counter_clk > ready;
+    (0..).find(counts).expect("CLK goes on")
+}
+
 fn first_edge(config: &SensorConfig, start: u64) -> Option<i64> {
     Some(p_counter::Rises::from_start_value(config, start as u16)?.first)
 }
 
 /// P-counter and timing block, connected as in a macropixel.
-fn circuit(config: &SensorConfig) -> Rig {
+fn circuit(config: &SensorConfig, silicon: &Silicon) -> Rig {
     let mut m = ModuleBuilder::new("tb_p_counter");
     for pin in ["CLK", "STOP", "RESETB", "ENABLE"] {
         m.input(pin);
@@ -223,7 +256,7 @@ fn circuit(config: &SensorConfig) -> Rig {
     let timing = p_counter_timing::circuit(config.after_borrow, config.reset_buffers());
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
-    Rig::new(&finished(m), config.corner)
+    Rig::of_silicon(&finished(m), silicon)
 }
 
 /// Counts changes to X.
@@ -247,7 +280,6 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
         ..
     } = bench;
     let exposure = Exposure::new(&bench.config, stop_periods as u32, 5);
-    let first_fall = bench.first_fall(&exposure);
     let stop = |cycle: i64| origin + exposure.stop(cycle);
     let falling = |cycle: i64, k: i64| origin + exposure.falling(cycle * stop_periods + k);
     let round = (bench.config.step_periods as i64) << (bench.config.counter_bits + 1);
@@ -259,7 +291,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let loads = [
         (
             first_start,
-            bench.load(&mut drives, Time::from_ns(5), first_start),
+            bench.load(&mut drives, bench.reset_end + TO_LOAD, first_start),
         ),
         (
             second_start,
@@ -290,7 +322,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let view = view(&rig.netlist, stop(0), stop(5));
     write_waves(waves, &rig.netlist, &view, |waves| {
         let mut observers = (&mut recorder, &mut *waves);
-        rig::run(&mut kernel, &mut stimulus, RESET_END, &mut observers);
+        rig::run(&mut kernel, &mut stimulus, bench.reset_end, &mut observers);
         let is_unknown = |&net: &NetId| kernel.value(net) == Logic::X;
         unknown_at_release = rig.nets().filter(is_unknown).count();
         let mut observers = ((&mut recorder, &mut unknowns), waves);
@@ -307,7 +339,8 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let corner = bench.config.corner;
     let flop = |pin, to| {
         let cells = CellLibrary::BUILT_IN.cells();
-        cells.delay(CellKind::Dffr, pin, to, corner)
+        let delay = cells.delay(CellKind::Dffr, pin, to, corner);
+        Time::from_fs((delay.as_fs() as f64 * bench.factor).round() as i64)
     };
     let clk_to_q = flop(1, Logic::One);
     for (value, rise) in loads {
@@ -353,18 +386,24 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
             let what = format!("cycle {cycle}: COUNTER_OUT when COUNTER_RESET falls");
             checks.equal(what, number_text(Some(start)), number_text(found));
 
-            // Every count is read when its ripple is over: before the next edge, the last one after the longest ripple.
+            // Every count is read when its ripple is over: before the next edge, the last one after the longest ripple. Where that is longer
+            // than a CLK period, the roll-over is not over when one more edge comes.
             let mut model = p_counter::PCounterModel::new(&bench.config, start as u16);
-            let expected = std::iter::from_fn(|| {
+            let counts = std::iter::from_fn(|| {
                 (!model.local_stop()).then(|| {
                     model.clock();
                     model.counter_out()
                 })
             });
+            let mut expected: Vec<_> = counts.collect();
+            if timing.ripple() > exposure.clock.period() {
+                expected.pop();
+            }
             let edges = clocked.iter().filter(within).filter(|t| **t > in_reset);
             let edges: Vec<Time> = edges.copied().collect();
             let settled = edges.iter().skip(1).map(|next| *next - Time::from_fs(1));
             let settled = settled.chain(edges.last().map(|last| *last + timing.ripple()));
+            let settled = settled.take(expected.len());
             let found = settled.map(|time| recorder.number_at(counter_out, time));
             checks.equal(
                 format!("cycle {cycle}: COUNTER_OUT after each rise of COUNTER_CLK"),
@@ -384,7 +423,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
             found.len(),
         );
         let Some(first) = first else { continue };
-        let fall = first_fall + first;
+        let fall = bench.first_fall + first;
         let edge = falling(cycle, fall);
         let expected = edge + timing.ripple() - stop(cycle);
         let what = format!("cycle {cycle}: LOCAL_STOP rises after STOP, by CLK fall {fall}");

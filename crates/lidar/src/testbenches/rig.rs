@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::chip::{CellLibrary, Exposure, SensorConfig};
+use crate::chip::{CellLibrary, Exposure, SensorConfig, Silicon};
 use crate::engine::GateSimulation;
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -53,6 +53,13 @@ impl Rig {
     /// In the built-in library.
     pub(super) fn new(circuit: &Arc<Module>, corner: Corner) -> Self {
         Rig::of_netlist(Netlist::elaborate(circuit), corner)
+    }
+
+    /// In built-in cells of this silicon.
+    pub(super) fn of_silicon(circuit: &Arc<Module>, silicon: &Silicon) -> Self {
+        let netlist = Netlist::elaborate(circuit);
+        let timing = silicon.timing(&netlist);
+        Rig { netlist, timing }
     }
 
     /// The same of a netlist.

@@ -24,7 +24,9 @@ pub struct Testbench {
 pub(super) struct GivenSensor {
     /// Blocks of one's own that it drives, as `--block` calls them.
     pub blocks: &'static [&'static str],
-    /// The same as [`Testbench::run`] with this sensor.
+    /// Complains of a sensor that it cannot drive.
+    pub check: fn(&SensorConfig) -> Result<(), InputError>,
+    /// The same as [`Testbench::run`] with this sensor, which has been checked.
     pub run: fn(&SensorConfig, &Path, &mut Checks) -> Result<(), InputError>,
 }
 
@@ -37,13 +39,24 @@ impl Testbench {
     pub fn run(&self, sensor: Option<&SensorConfig>, waves: &Path) -> Result<Checks, InputError> {
         let mut checks = Checks::new();
         match (self.given, sensor) {
-            (Some(given), Some(sensor)) => (given.run)(sensor, waves, &mut checks)?,
+            (Some(given), Some(sensor)) => {
+                (given.check)(sensor)?;
+                (given.run)(sensor, waves, &mut checks)?;
+            }
             _ => (self.run)(waves, &mut checks)?,
         }
         Ok(checks)
     }
 
-    /// Whether it drives this sensor with all blocks of its own.
+    /// Whether it can drive this sensor, as far as it takes one.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    pub fn check(&self, sensor: &SensorConfig) -> Result<(), InputError> {
+        self.given.map_or(Ok(()), |given| (given.check)(sensor))
+    }
+
+    /// Whether it drives sensors, and all blocks of its own that this one has.
     pub fn drives(&self, sensor: &SensorConfig) -> bool {
         let drives = |given: GivenSensor| {
             let mut own = sensor.own_files();

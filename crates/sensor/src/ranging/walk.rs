@@ -85,6 +85,11 @@ impl WalkLeft {
         WalkLeft::NotConverged,
     ];
 
+    /// The reason as a number in arrays: its place in [`WalkLeft::ALL`] from 1 on, and 0 where no walk is left.
+    pub fn number(walk_left: Option<Self>) -> u8 {
+        walk_left.map_or(0, |why| 1 + why as u8)
+    }
+
     /// In tables.
     pub const fn name(self) -> &'static str {
         match self {

@@ -3,11 +3,10 @@
 //! A netlist of one's own could count laser cycles, or look at COUNTER_INIT after the load. The contract of the block refuses both
 //! (`chip/own_block`); here such a counter would be seen at work.
 
-use super::{BEFORE, Bench};
+use super::{BEFORE, Bench, TO_LOAD};
 use crate::chip::Exposure;
 use crate::kernel::Recorder;
 use crate::report::Checks;
-use crate::units::Time;
 
 /// Laser cycles.
 const CYCLES: i64 = 200;
@@ -25,9 +24,9 @@ pub(super) fn count_alike(bench: &Bench, checks: &mut Checks) {
         return;
     };
     let exposure = Exposure::new(&bench.config, stop_periods as u32, CYCLES as u32);
-    let fall = bench.first_fall(&exposure) + first;
+    let fall = bench.first_fall + first;
     let mut drives = bench.power_up();
-    bench.load(&mut drives, Time::from_ns(5), start);
+    bench.load(&mut drives, bench.reset_end + TO_LOAD, start);
     drives.set(origin, bench.enable, true);
     for cycle in 0..CYCLES {
         let stop = origin + exposure.stop(cycle);
