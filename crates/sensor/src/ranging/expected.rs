@@ -55,6 +55,9 @@ const LEAST_SIGMA: f64 = 0.02;
 /// Parameters of the light: place, ln signal, ln background, ln width.
 pub(super) const PARAMETERS: usize = 4;
 
+/// Share of laser cycles that is taken to reach a bin at least, so that counts there say something: chosen.
+const LEAST_REACHED: f64 = 1e-3;
+
 /// Light on a macropixel, in mean photons that its SPADs would detect without dead time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EchoLight {
@@ -192,6 +195,18 @@ impl Response {
         }
         let fired = self.counting.fired_for(chance.min(0.999));
         -(self.counting.spads as f64) * libm::log1p(-fired)
+    }
+
+    /// Laser cycles, of `cycles`, that reach each bin: all, or of first events those without one before.
+    pub(super) fn reached(&self, counts: &[f64], cycles: f64) -> Vec<f64> {
+        let law = self.other_bins.as_ref().filter(|law| law.first_only);
+        let mut left = cycles;
+        let reached = counts.iter().map(|count| {
+            let reached = left.max(LEAST_REACHED * cycles);
+            left -= law.map_or(0.0, |law| count * law.parts);
+            reached
+        });
+        reached.collect()
     }
 
     /// Dead time, bins.

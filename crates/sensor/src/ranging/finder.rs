@@ -82,8 +82,10 @@ pub struct EchoFinder {
     peak: PeakOptions,
     ln_false_alarm: f64,
     scan: Scan,
-    /// Counts at which bins stop counting, where they can be reached. One that wraps shows nothing.
+    /// Counts at which bins stop counting, where they can be reached.
     full: Option<u32>,
+    /// Counts from which on a bin may have wrapped, or be about to: half of those that it has bits for.
+    may_wrap: Option<u32>,
     walk: Option<Result<WalkCorrection, WalkLeft>>,
     /// Laser cycles, where bins that do not count are what an echo makes.
     uncounted_of: Option<u32>,
@@ -145,13 +147,16 @@ impl EchoFinder {
             }),
         };
         let capacity = (1u32 << config.bin_bits) - 1;
+        let full = (capacity < laser_cycles).then_some(capacity);
         Ok(EchoFinder {
             bin_s,
             peak: options.peak,
             ln_false_alarm: libm::log(options.false_alarm_rate),
             scan: Scan::matched(response.pulse_sigma_bins, config.bins, laser_cycles),
-            full: (config.overflow == Overflow::Saturate && capacity < laser_cycles)
-                .then_some(capacity),
+            full: full.filter(|_| config.overflow == Overflow::Saturate),
+            may_wrap: full
+                .filter(|_| config.overflow == Overflow::Wrap)
+                .map(|capacity| capacity / 2),
             walk: options.correct_walk.then_some(walk),
             uncounted_of: complement.is_some().then_some(laser_cycles),
         })
@@ -170,6 +175,7 @@ impl EchoFinder {
             ln_false_alarm: libm::log(options.false_alarm_rate),
             scan: Scan::matched(response.pulse_sigma_bins, response.bins, laser_cycles),
             full,
+            may_wrap: None,
             walk: options.correct_walk.then_some(Ok(WalkCorrection {
                 response,
                 laser_cycles,
@@ -232,12 +238,18 @@ impl EchoFinder {
         }))?;
         let is_significant = stretch.ln_false_alarm <= self.ln_false_alarm;
         // Where there is no depth anyway, nothing is known of the light either.
-        let corrects = is_significant && !is_saturated;
+        // What has wrapped looks like less light.
+        let has_wrapped = self
+            .may_wrap
+            .is_some_and(|least| counts.iter().any(|&n| n > least));
+        let corrects = is_significant && !is_saturated && !has_wrapped;
         let walk = self.walk.as_ref().filter(|_| corrects);
         let whole = walk.map(|walk| match walk {
             Ok(walk) => walk.correct(&real, &peak),
             Err(left) => Err(*left),
         });
+        let is_unlike = has_wrapped && is_significant && self.walk.is_some();
+        let whole = whole.or(is_unlike.then_some(Err(WalkLeft::NotOneEcho)));
         let (fitted, others) = if corrects {
             self.first_echo_and_others(&real, &peak, whole, share)
         } else {

@@ -37,6 +37,9 @@ const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 /// were beyond five bounds of the likelihood's curvature at two of three distances.
 const SHARP: f64 = 20.0;
 
+/// Share of the laser cycles that must reach a bin to tell the background: chosen.
+const WELL_REACHED: f64 = 0.02;
+
 /// Standard deviation with which a deep echo is sought, bins: chosen.
 const DEEP_BINS: f64 = 2.5;
 
@@ -348,9 +351,10 @@ impl WalkCorrection {
         cycles: f64,
         background_per_bin: f64,
     ) -> Option<EchoLight> {
+        let reached = self.response.reached(counts, cycles);
         let (signal, moment) = bins.fold((0.0, 0.0), |(signal, moment), bin| {
-            let of_bin =
-                (self.response.steady_light(counts[bin] / cycles) - background_per_bin).max(0.0);
+            let light = self.response.steady_light(counts[bin] / reached[bin]);
+            let of_bin = (light - background_per_bin).max(0.0);
             (signal + of_bin, moment + of_bin * bin as f64)
         });
         (signal > 0.0).then(|| EchoLight {
@@ -421,7 +425,10 @@ impl WalkCorrection {
         if self.response.counting.event_type != EventType::Greater {
             return [0.03, 1.0];
         }
-        let mut sorted = counts.to_vec();
+        let reached = self.response.reached(counts, cycles);
+        let is_reached = |(_, reached): &(&f64, &f64)| **reached > WELL_REACHED * cycles;
+        let known = counts.iter().zip(&reached).filter(is_reached);
+        let mut sorted: Vec<f64> = known.map(|(n, reached)| n * (cycles / reached)).collect();
         sorted.sort_by(f64::total_cmp);
         let few = sorted[sorted.len() / 3];
         // Where nothing counts, the background is some tenth of what would show.

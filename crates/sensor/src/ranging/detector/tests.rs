@@ -195,6 +195,28 @@ fn depths_of_photons_drawn_one_by_one_keep_their_bounds() {
     }
 }
 
+/// Of 2000 laser cycles some 40 reach the echo; in the first bins nothing is.
+#[test]
+fn first_events_behind_much_background_leave_no_depth_where_nothing_is() {
+    let detector = detector(CountedEvents::First);
+    let light = Light::new(59e-9, 0.8, 6.4);
+    let mut random = StdRng::seed_from_u64(5);
+    let (mut found, mut known) = (0, 0);
+    for _ in 0..200 {
+        let counts = histogram(&mut random, &detector, &light);
+        let Ok(returns) = detector.returns(&counts, &DepthOptions::default()) else {
+            continue;
+        };
+        found += 1;
+        if let Some(bound_m) = returns[0].bound_m {
+            known += 1;
+            let off_m = (returns[0].depth_m - light.depth_m()).abs();
+            assert!(off_m < 5.0 * bound_m, "{returns:?}");
+        }
+    }
+    assert!(found > 50 && 2 * known > found, "{found} {known}");
+}
+
 #[test]
 fn depths_of_spads_that_fire_together_keep_their_bounds() {
     for counted in [CountedEvents::Every, CountedEvents::First] {

@@ -1,7 +1,7 @@
 //! Echoes that one light explains and those that none does, full bins, and reasons why range walk is left.
 
 use super::*;
-use crate::chip::{EventType, Exposure, FrontEnd, SensorConfig, hslidar_delay_line};
+use crate::chip::{EventType, Exposure, FrontEnd, Overflow, SensorConfig, hslidar_delay_line};
 use crate::ranging::{EchoLight, Response};
 use crate::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -266,5 +266,37 @@ fn one_echo_is_one_return() {
             wrong += usize::from(found.others[0].is_some());
         }
         assert!(wrong <= 5, "{signal} {background_per_bin}: {wrong}");
+    }
+}
+
+#[test]
+fn counts_that_may_have_wrapped_have_no_bound() {
+    let sensor = |bin_bits| SensorConfig {
+        bin_bits,
+        overflow: Overflow::Wrap,
+        ..SensorConfig::default()
+    };
+    let echo = EchoLight {
+        position_bins: 6.3,
+        signal: 0.3,
+        background_per_bin: 0.02,
+        sigma_bins: PULSE_SIGMA.as_s() / finder(&sensor(14), 520).bin_s,
+    };
+    for (bin_bits, has_bound) in [(14, true), (9, true), (7, false), (6, false)] {
+        let config = sensor(bin_bits);
+        let finder = finder(&config, 520);
+        let response = Response::new(&config, finder.bin_s, PULSE_SIGMA);
+        let chances = response.chances(&echo);
+        let counts = chances.iter().map(|p| (1000.0 * p).round() as u32);
+        let counts: Vec<u32> = counts.map(|n| n % (1 << bin_bits)).collect();
+        let found = finder.find(&counts).unwrap();
+        assert!(found.is_significant, "{bin_bits}: {counts:?}");
+        assert_eq!(
+            found.bound_bins.is_some(),
+            has_bound,
+            "{bin_bits}: {counts:?}"
+        );
+        let why = (!has_bound).then_some(WalkLeft::NotOneEcho);
+        assert_eq!(found.walk_left, why);
     }
 }

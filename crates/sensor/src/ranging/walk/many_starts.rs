@@ -139,12 +139,11 @@ impl WalkCorrection {
         if counting.event_type != EventType::Greater {
             return None;
         }
-        let light = |&counts: &f64| {
-            self.response
-                .steady_light((counts / likelihood.cycles).min(0.99))
-                - background
+        let reached = self.response.reached(likelihood.counts, likelihood.cycles);
+        let light = |(counts, reached): (&f64, &f64)| {
+            self.response.steady_light((counts / reached).min(0.99)) - background
         };
-        let bins = likelihood.counts.iter().map(light);
+        let bins = likelihood.counts.iter().zip(&reached).map(light);
         let bins: Vec<f64> = bins.collect();
         let most = bins.iter().copied().fold(0.0, f64::max);
         let bin = bins.iter().position(|&photons| photons > 0.2 * most)?;
