@@ -6,6 +6,7 @@ use guided_dtof::ranging::{
     WalkLeft,
 };
 use guided_dtof::request::{Spelling, check_false_alarm_rate};
+use guided_dtof::settings::said_remarks;
 use guided_dtof::system::RETURNS;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -19,9 +20,13 @@ use crate::failure::Failure;
 /// Bins, and the detector's description as JSON.
 type BinsAndDescription = (usize, String);
 
+fn parse(description: &str) -> Result<DetectorDescription, Failure> {
+    serde_json::from_str(description)
+        .map_err(|error| Failure::argument("detector", error.to_string()))
+}
+
 fn detector((bins, description): BinsAndDescription) -> Result<Detector, Failure> {
-    let description: DetectorDescription = serde_json::from_str(&description)
-        .map_err(|error| Failure::argument("detector", error.to_string()))?;
+    let description = parse(&description)?;
     let detector = description.detector(bins);
     detector.map_err(|bad| {
         let key = match bad.key {
@@ -32,11 +37,12 @@ fn detector((bins, description): BinsAndDescription) -> Result<Detector, Failure
     })
 }
 
-/// Checks a description.
+/// Checks a description, and says what in it is probably in another unit.
 #[pyfunction]
-pub(crate) fn detector_checked(described: BinsAndDescription) -> PyResult<()> {
+pub(crate) fn detector_checked(described: BinsAndDescription) -> PyResult<Vec<String>> {
+    let remarks = parse(&described.1)?.remarks();
     detector(described)?;
-    Ok(())
+    Ok(said_remarks("the detector", &remarks))
 }
 
 /// The description in a file, as JSON.

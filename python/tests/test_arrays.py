@@ -35,6 +35,10 @@ def test_arrays_own_what_rust_made(frame: gdtof.Frame) -> None:
 def test_reasons_are_the_librarys(frame: gdtof.Frame) -> None:
     assert [reason_name(reason) for reason in gdtof.Reason][1:] == list(_gdtof.REASONS)
     assert np.array_equal(frame.reason == gdtof.Reason.DEPTH, np.isfinite(frame.depth))
+    assert len(gdtof.WalkLeft) == len(_gdtof.WALKS_LEFT) + 1
+    has_no_bound = np.isfinite(frame.depth) & np.isnan(frame.bound)
+    assert (frame.walk_left[has_no_bound] != gdtof.WalkLeft.NONE).all() and has_no_bound.any()
+    assert (frame.walk_left[np.isnan(frame.depth)] == gdtof.WalkLeft.NONE).all()
     assert np.array_equal(np.isnan(frame.truth), np.isin(frame.reason, [gdtof.Reason.NO_SURFACE]))
     for name, count in frame.summary["no_depth"].items():
         assert (frame.reason == gdtof.Reason[name.upper()]).sum() == count

@@ -1,6 +1,7 @@
 """Histograms of any sensor."""
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -235,3 +236,26 @@ def test_the_command_reads_archives_of_numpy(save: Callable[..., None], tmp_path
     words = f"range --format counts --bin-width-ns {BIN_NS} --pulse-fwhm-ns {FWHM_NS} --start-ns 2 --json --histograms"
     zones = json.loads(command(*words.split(), file))["zones"]
     assert [zone["returns"][0]["depth_m"] for zone in zones] == list(detector.range(counts).depth)
+
+
+def test_what_is_no_number_is_refused_and_odd_units_are_warned_of() -> None:
+    wrongs: list[tuple[dict[str, Any], str]] = [
+        ({"bin_ns": "1 ns"}, "bin_ns: '1 ns' is no number"),
+        ({"bin_ns": float("nan")}, "bin_ns: nan is impossible"),
+        ({"pulse_fwhm_ns": True}, "pulse_fwhm_ns: True is no number"),
+        ({"bins": "64"}, "bins: '64' is no whole number"),
+        ({"bins": 64.0}, "bins: 64.0 is no whole number"),
+    ]
+    for wrong, says in wrongs:
+        with pytest.raises(gdtof.InputError, match=re.escape(says)):
+            gdtof.Detector(**({"bins": 64, "bin_ns": 1.0, "pulse_fwhm_ns": 2.0} | wrong))
+    with pytest.warns(UserWarning, match="if you mean 1000 ps, give 1 ns") as warned:
+        gdtof.Detector(64, 1000, 2)
+    assert warned[0].filename == __file__
+
+
+def test_detectors_with_edges_are_equal_and_have_a_hash() -> None:
+    edges = np.arange(65.0)
+    one, other = (gdtof.Detector(64, pulse_fwhm_ns=2.0, bin_edges_ns=edges) for _ in "ab")
+    assert one == other and hash(one) == hash(other)
+    assert one != gdtof.Detector(64, pulse_fwhm_ns=2.0, bin_edges_ns=edges + 1)

@@ -88,3 +88,11 @@ def test_a_replay_of_them_is_the_frame() -> None:
 def test_what_cannot_be(keys: dict[str, float], drawn: dict[str, float], says: str) -> None:
     with pytest.raises(gdtof.InputError, match=says):
         gdtof.light(**keys).photons(**drawn)  # type: ignore[arg-type]
+
+
+def test_spads_that_are_off_count_nothing_in_a_replay() -> None:
+    sensor = gdtof.Sensor(rows=1, cols=2)
+    time_fs = np.full(2, 1_300_000_000)
+    for engine in ("gate", "cycle", "window"):
+        replayed = gdtof.replay(time_fs, [0, 1], [3, 3], [[-1, 511]], sensor=sensor, laser_cycles=1, engine=engine)
+        assert replayed.histograms.sum(axis=2).tolist() == [[0, 1]]

@@ -162,3 +162,15 @@ def test_what_cannot_be(study: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
     with pytest.raises(gdtof.InputError, match="parts: are for a client"):
         gdtof.sweep(study, tmp_path, parts=3)
+
+
+def test_a_sweep_without_any_result_raises_why(tmp_path: Path) -> None:
+    study: dict[str, Any] = {"fixed": {"sensor.rows": 4, "sensor.cols": 4, "frame.laser_cycles": 100}}
+    study["vary"] = {"sensor.clk_hz": ["900 MHz", "950 MHz"]}
+    for _ in "ab":
+        with pytest.raises(gdtof.InputError, match="no point has a result: "):
+            gdtof.sweep(study, tmp_path / "out")
+    study["vary"] = {"sensor.clk_hz": ["300 MHz", "900 MHz"]}
+    for reused in (1, 2):
+        swept = gdtof.sweep(study, tmp_path / "out")
+        assert (swept.reused, swept.without_results) == (reused, 1)

@@ -99,3 +99,8 @@ def test_what_cannot_be(ask: object, says: str) -> None:
     assert callable(ask)
     with pytest.raises(gdtof.InputError, match=says):
         ask()
+
+
+def test_a_bound_of_nothing_is_infinite() -> None:
+    assert np.isinf(gdtof.theory.cramer_rao(1.0, 1.0, 1.0, 0.0))
+    assert np.isinf(gdtof.theory.cramer_rao(1.0, 0.0, 1.0, 10.0))

@@ -41,6 +41,9 @@ def policy_of(windows: Policy) -> str:
     if windows is None or isinstance(windows, str):
         return windows or ""
 
+    if not isinstance(windows, Mapping):
+        raise InputError(f"windows: {windows!r} is no policy; give a dict, or a text such as 'overlap=0.3'")
+
     def text(value: Any) -> str:
         return str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
 
@@ -74,7 +77,11 @@ def starts_of(starts: ArrayLike, sensor: Sensor) -> NDArray[np.int64]:
 
 def numbers(values: ArrayLike) -> NDArray[np.float64]:
     """Numbers in their shape; NaN where they are masked."""
-    filled: NDArray[np.float64] = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    try:
+        masked = np.ma.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{values!r}: is no number; give numbers, in the unit of the argument's name") from None
+    filled: NDArray[np.float64] = np.ma.filled(masked, np.nan)
     return filled
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
+import warnings
 from dataclasses import dataclass
+from numbers import Integral, Real
 from os import PathLike, fspath
 from typing import Any, NamedTuple
 
@@ -127,6 +130,14 @@ class Detector:
     """Counts at which a bin stops."""
 
     def __post_init__(self) -> None:
+        for name in ("bin_ns", "pulse_fwhm_ns", "start_ns"):
+            number = getattr(self, name)
+            if number is not None and not isinstance(number, Real) or isinstance(number, bool):
+                raise InputError(f"{name}: {number!r} is no number; give one, in ns")
+            if number is not None and not math.isfinite(number):
+                raise InputError(f"{name}: {number!r} is impossible; give a finite number, in ns")
+        if not isinstance(self.bins, Integral):
+            raise InputError(f"bins: {self.bins!r} is no whole number; give 2 to 65536")
         if not 2 <= self.bins <= 65536:
             raise InputError(f"bins: {self.bins} is impossible; give 2 to 65536")
         if self.first_of is not None and self.laser_cycles is not None:
@@ -134,7 +145,9 @@ class Detector:
         if self.bin_edges_ns is not None:
             edges = np.asarray(self.bin_edges_ns, np.float64)
             object.__setattr__(self, "bin_edges_ns", tuple(edges.ravel().tolist()))
-        _gdtof.detector_checked(self._described())
+        for said in _gdtof.detector_checked(self._described()):
+            # The caller's line is behind the one that makes the object.
+            warnings.warn(said.replace("bin_width_ns", "bin_ns"), UserWarning, stacklevel=3)
 
     @classmethod
     def load(cls, path: str | PathLike[str], bins: int) -> Detector:
