@@ -55,7 +55,7 @@ impl Scene {
 
     /// A scene as its user gave it, who is told of odd values.
     fn given(py: Python<'_>, world: World, name: String) -> PyResult<Self> {
-        warn_of(py, &name, &world.remarks())?;
+        warn_of(py, &name, &world.remarks(), 1)?;
         Ok(Scene { world, name })
     }
 }

@@ -43,7 +43,7 @@ impl Sensor {
     /// A sensor as its user gave it, who is told of odd values.
     fn given(py: Python<'_>, chip: impl Into<Chip>) -> PyResult<Self> {
         let chip = chip.into();
-        warn_of(py, "the sensor", &chip.remarks())?;
+        warn_of(py, "the sensor", &chip.remarks(), 1)?;
         Ok(Sensor { chip })
     }
 }

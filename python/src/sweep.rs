@@ -53,7 +53,7 @@ pub(crate) fn sweep_outline(
     text: Option<&str>,
 ) -> PyResult<(u64, PathBuf, String)> {
     let study = read(&study, text).map_err(Failure::from)?;
-    warn_of(py, "the study", &study.remarks())?;
+    warn_of(py, "the study", &study.remarks(), 2)?;
     Ok((study.len(), study.out.clone(), study.name))
 }
 

@@ -216,15 +216,20 @@ pub(crate) fn reassigned(
     Ok(document)
 }
 
-/// Warns of values that are probably in another unit than their key has.
+/// Warns of values that are probably in another unit than their key has; the warning is about the line `level` calls up in Python.
 ///
 /// # Errors
 /// When warnings are errors.
-pub(crate) fn warn_of(py: Python<'_>, source: &str, remarks: &[String]) -> PyResult<()> {
+pub(crate) fn warn_of(
+    py: Python<'_>,
+    source: &str,
+    remarks: &[String],
+    level: i32,
+) -> PyResult<()> {
     let category = py.get_type::<PyUserWarning>();
     for said in said_remarks(source, remarks) {
         let said = CString::new(said).expect("a name of a file has no zero in it");
-        PyErr::warn(py, &category, &said, 1)?;
+        PyErr::warn(py, &category, &said, level)?;
     }
     Ok(())
 }

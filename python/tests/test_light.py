@@ -96,3 +96,10 @@ def test_spads_that_are_off_count_nothing_in_a_replay() -> None:
     for engine in ("gate", "cycle", "window"):
         replayed = gdtof.replay(time_fs, [0, 1], [3, 3], [[-1, 511]], sensor=sensor, laser_cycles=1, engine=engine)
         assert replayed.histograms.sum(axis=2).tolist() == [[0, 1]]
+
+
+def test_seconds_for_nanoseconds_are_warned_of() -> None:
+    sensor = gdtof.Sensor(rows=1, cols=1)
+    with pytest.warns(UserWarning, match="if you mean 5e-08 s, give 50 ns") as warned:
+        gdtof.expose(10, 1e6, 1.0, 50e-9, sensor=sensor, laser_cycles=1)
+    assert warned[0].filename == __file__

@@ -174,3 +174,11 @@ def test_a_sweep_without_any_result_raises_why(tmp_path: Path) -> None:
     for reused in (1, 2):
         swept = gdtof.sweep(study, tmp_path / "out")
         assert (swept.reused, swept.without_results) == (reused, 1)
+
+
+def test_a_value_in_another_unit_is_warned_of_where_the_sweep_is_called(tmp_path: Path) -> None:
+    study: dict[str, Any] = {"fixed": {"sensor.rows": 1, "sensor.cols": 1, "frame.laser_cycles": 10}}
+    study["vary"] = {"scene.lidar.pulse_fwhm_ns": [5e-9, 5.0]}
+    with pytest.warns(UserWarning, match="give 5 ns") as warned:
+        gdtof.sweep(study, tmp_path / "out")
+    assert warned[0].filename == __file__

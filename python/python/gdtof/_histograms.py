@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -134,6 +135,9 @@ def expose(
     shape = (rows, cols)
     photons, arrivals = numbers(signal), numbers(arrival_ns)
     sigmas = None if sigma_ns is None else numbers(sigma_ns)
+    _warn_of_seconds("arrival_ns", arrivals)
+    if sigmas is not None:
+        _warn_of_seconds("sigma_ns", sigmas)
     several = [a.shape[2] for a in (photons, arrivals, sigmas) if a is not None and a.ndim == 3]
     of_echoes = (rows, cols, several[0] if several else 1)
 
@@ -163,6 +167,15 @@ def expose(
         progress,
     )
     return Exposed(**exposed)
+
+
+def _warn_of_seconds(name: str, values_ns: NDArray[np.float64]) -> None:
+    """Nanoseconds are at least thousandths where anything is timed."""
+    known = values_ns[np.isfinite(values_ns) & (values_ns > 0)]
+    if known.size and known.max() < 1e-3:
+        said = f"{name}: {known.max():g} ns is far from the usual; if you mean {known.max():g} s, give {1e9 * known.max():g} ns"
+        # The caller of `expose`.
+        warnings.warn(said, UserWarning, stacklevel=3)
 
 
 def _fits(values: NDArray[Any], shape: tuple[int, ...]) -> bool:
