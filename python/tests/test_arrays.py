@@ -208,3 +208,10 @@ def test_timing_tells_what_is_tightest(sensor: gdtof.Sensor) -> None:
     slow = gdtof.timing(sensor, voltage_v=0.9)
     assert slow.ripple_ps > nominal.ripple_ps
     assert not gdtof.timing(sensor.with_(clk_hz="2 GHz")).met
+
+
+def test_a_guide_or_a_policy_of_another_type_is_refused() -> None:
+    with pytest.raises(gdtof.InputError, match="give texts or Guides, or a map as an array"):
+        gdtof.frame(guide=[[30.0] * 64] * 64)  # type: ignore[list-item]
+    with pytest.raises(gdtof.InputError, match="windows: 3 is no policy"):
+        gdtof.frame(windows=3)  # type: ignore[arg-type]

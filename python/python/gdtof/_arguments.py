@@ -33,6 +33,8 @@ def guide_of(guide: GuideLike) -> Guide | None:
         return Guide(guide)
     if isinstance(guide, np.ndarray):
         return Guide.from_map(guide)
+    if not all(isinstance(one, Guide | str) for one in guide):
+        raise InputError("guide: is a list of what are no guides; give texts or Guides, or a map as an array of NumPy")
     return Guide(*guide)
 
 
