@@ -42,7 +42,10 @@ fn detector((bins, description): BinsAndDescription) -> Result<Detector, Failure
 pub(crate) fn detector_checked(described: BinsAndDescription) -> PyResult<Vec<String>> {
     let remarks = parse(&described.1)?.remarks();
     detector(described)?;
-    Ok(said_remarks("the detector", &remarks))
+    let said = said_remarks("the detector", &remarks).into_iter();
+    Ok(said
+        .map(|said| said.replace("bin_width_ns", "bin_ns"))
+        .collect())
 }
 
 /// The description in a file, as JSON.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use guided_dtof::files::{InputError, ResultSet};
 use guided_dtof::sweep::{
-    Results, Shard, Study, SweepError, TableCell, run as take_points, study_of,
+    Results, Shard, Study, SweepError, WrittenTable, run as take_points, study_of,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -82,49 +82,31 @@ pub(crate) fn sweep_part<'py>(
     by_json(py, &outcome)
 }
 
-/// Writes the table of all rows in a folder; how many points have none, how many of the rows have no result, and why, if no row has one.
+/// Writes the table of all rows in a folder; how many points have none, and how many of the rows have no result.
+///
+/// # Errors
+/// Why the first point has no result, if no point has one.
 #[pyfunction]
 pub(crate) fn sweep_table<'py>(py: Python<'py>, folder: PathBuf) -> PyResult<Bound<'py, PyDict>> {
     let written = run(py, None, move |_| Ok(write(&folder)?))?;
     let dict = PyDict::new(py);
-    dict.set_item("points", written.points)?;
     dict.set_item("missing", written.missing)?;
     dict.set_item("without_results", written.without_results)?;
-    let has_none = written.missing + written.without_results == written.points;
-    dict.set_item("fault", written.fault.filter(|_| has_none))?;
     Ok(dict)
 }
 
-/// A table that has been written.
-struct Written {
-    points: u64,
-    missing: u64,
-    without_results: u64,
-    /// Of the first row that has no result.
-    fault: Option<String>,
-}
-
-fn write(folder: &Path) -> Result<Written, SweepError> {
+fn write(folder: &Path) -> Result<WrittenTable, SweepError> {
     let study = study_of(folder)?;
     let set = ResultSet::begin(folder, "sweep")?;
     let results = Results::read(&study, &[folder.to_owned()])?;
-    let (mut without_results, mut fault) = (0, None);
-    let missing = results.write(set.staging(), |cells| {
-        // The last column says why there is no result.
-        if let Some(TableCell::Word(why)) = cells.last() {
-            without_results += 1;
-            fault.get_or_insert_with(|| why.clone());
-        }
-    })?;
+    let written = results.write(set.staging(), |_| ())?;
     let configuration = serde_json::json!({
         "study": study.text(),
-        "points": study.len() - missing,
+        "points": study.len() - written.missing,
     });
     set.commit(configuration)?;
-    Ok(Written {
-        points: study.len(),
-        missing,
-        without_results,
-        fault,
-    })
+    if written.missing == 0 {
+        written.check(&study)?;
+    }
+    Ok(written)
 }

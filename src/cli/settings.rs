@@ -108,13 +108,13 @@ impl SensorArgs {
     /// Why the values of the chip were chosen, if it is built in.
     fn notes(&self) -> Notes {
         let default = self.sensor.is_none().then_some(CHIPS[0].name);
-        let name = self.names(None).chip().or(default);
+        let name = self.named_sources(None).chip().or(default);
         name.and_then(Sensor::built_in_notes).unwrap_or_default()
     }
 
     /// What the top of the exported chip is called: modes of a chip are named after it.
     pub(super) fn chip(&self) -> &'static str {
-        let asked = self.names(None).chip().unwrap_or(array::NAME);
+        let asked = self.named_sources(None).chip().unwrap_or(array::NAME);
         let mut chips = CHIPS.iter().map(|chip| chip.name);
         chips.find(|chip| asked.starts_with(chip)).unwrap_or(asked)
     }
@@ -182,12 +182,12 @@ impl SensorArgs {
         }
         Ok(Sources {
             set,
-            ..self.names(scene)
+            ..self.named_sources(scene)
         })
     }
 
-    /// The sensor and the scene as they are named, before anything is set.
-    fn names(&self, scene: Option<PathBuf>) -> Sources {
+    /// The sensor and the scene as they are named, before single keys are set.
+    fn named_sources(&self, scene: Option<PathBuf>) -> Sources {
         Sources {
             sensor: self.sensor.clone(),
             scene,
@@ -231,7 +231,7 @@ impl SceneArgs {
 
     /// What reports call the scene.
     pub(super) fn scene_name(&self) -> String {
-        self.sensor.names(self.scene.clone()).scene_name()
+        self.sensor.named_sources(self.scene.clone()).scene_name()
     }
 
     /// Why the values of the scene were chosen, if it is built in.

@@ -11,7 +11,7 @@ use super::voice::{note, notes, progress, quantity, say_unless_quiet};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
-    Drawing, Outcome, Plot, Results, Shard, Study, StudyKind, SweepError, TableCell, columns,
+    Drawing, Outcome, Plot, Results, Shard, Study, StudyKind, SweepError, WrittenTable, columns,
     run as take, study_of,
 };
 
@@ -113,7 +113,7 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
         })?;
         table.push("in", folder.display());
         say_unless_quiet(table)?;
-        written.complain(&study)?;
+        written.check(&study)?;
     } else {
         say_unless_quiet(table)?;
         say_unless_quiet(format_args!(
@@ -155,28 +155,7 @@ fn run_merge(args: &MergeArgs) -> anyhow::Result<()> {
     }
     table.push("in", out.display());
     say_unless_quiet(table)?;
-    Ok(written.complain(&study)?)
-}
-
-/// What stands in a table.
-struct Written {
-    /// Points that do not.
-    missing: u64,
-    /// Why the first point has no result, if no point has one.
-    fault: Option<String>,
-}
-
-impl Written {
-    /// Complains of a study whose settings are wrong at every point.
-    fn complain(self, study: &Study) -> Result<(), InputError> {
-        match self.fault {
-            Some(why) => {
-                let message = format!("no point has a result: {why}");
-                Err(InputError::new(&study.name, message))
-            }
-            None => Ok(()),
-        }
-    }
+    Ok(written.check(&study)?)
 }
 
 /// What is drawn, by columns that there are.
@@ -203,7 +182,7 @@ fn write(
     plots: &[Plot],
     outcome: Option<Outcome>,
     check: impl FnOnce(u64) -> anyhow::Result<()>,
-) -> anyhow::Result<Written> {
+) -> anyhow::Result<WrittenTable> {
     let columns = columns(study);
     let set = ResultSet::begin(out, "sweep")?;
     let drawings = plots
@@ -211,31 +190,24 @@ fn write(
         .map(|plot| Drawing::new(plot, study, &columns, "--plot"));
     let mut drawings: Vec<Drawing<'_>> = drawings.collect::<Result<_, _>>()?;
     let results = Results::read(study, folders)?;
-    let (mut fault, mut has_result) = (None, false);
-    let missing = results.write(set.staging(), |cells| {
-        match cells.last() {
-            // The last column says why there is no result.
-            Some(TableCell::Word(why)) => drop(fault.get_or_insert_with(|| why.clone())),
-            _ => has_result = true,
-        }
+    let written = results.write(set.staging(), |cells| {
         drawings
             .iter_mut()
             .for_each(|drawing| drawing.add_row(cells));
     });
-    let missing = missing.map_err(plain)?;
-    check(missing)?;
+    let written = written.map_err(plain)?;
+    check(written.missing)?;
     for (drawing, plot) in drawings.into_iter().zip(plots) {
         let chart = drawing.chart("--plot")?;
         chart.write(&set.staging().join(plot.file_name() + ".svg"))?;
     }
     let configuration = Configuration {
         study: study.text(),
-        points: study.len() - missing,
+        points: study.len() - written.missing,
         outcome,
     };
     notes(set.commit(configuration)?);
-    let fault = fault.filter(|_| !has_result);
-    Ok(Written { missing, fault })
+    Ok(written)
 }
 
 /// As what it is, for the exit status.

@@ -147,7 +147,7 @@ class Detector:
             object.__setattr__(self, "bin_edges_ns", tuple(edges.ravel().tolist()))
         for said in _gdtof.detector_checked(self._described()):
             # The caller's line is behind the one that makes the object.
-            warnings.warn(said.replace("bin_width_ns", "bin_ns"), UserWarning, stacklevel=3)
+            warnings.warn(said, UserWarning, stacklevel=3)
 
     @classmethod
     def load(cls, path: str | PathLike[str], bins: int) -> Detector:

@@ -47,4 +47,4 @@ pub use plot::{Drawing, Plot};
 pub use row::StudyRow;
 pub use run::{Outcome, Shard, run, study_of};
 pub use study::{MOST_POINTS, Study, StudyKind};
-pub use table::{CSV, PARQUET, Results, TIMES, columns};
+pub use table::{CSV, PARQUET, Results, TIMES, WrittenTable, columns};

@@ -120,7 +120,7 @@ impl<'a> Results<'a> {
         Ok(missing)
     }
 
-    /// Writes [`CSV`], [`PARQUET`] and, of frames, [`TIMES`] into `folder`; `also` sees every row. Returns how many points have no row.
+    /// Writes [`CSV`], [`PARQUET`] and, of frames, [`TIMES`] into `folder`; `also` sees every row.
     ///
     /// # Errors
     /// As those of `Results::each`.
@@ -128,8 +128,9 @@ impl<'a> Results<'a> {
         &self,
         folder: &Path,
         mut also: impl FnMut(&[TableCell]),
-    ) -> Result<u64, SweepError> {
+    ) -> Result<WrittenTable, SweepError> {
         let columns = columns(self.study);
+        let (mut rows, mut without_results, mut fault) = (0, 0, None);
         let mut csv = OutputFile::create(&folder.join(CSV))?;
         let mut times = match self.study.kind {
             StudyKind::Frame => Some(OutputFile::create(&folder.join(TIMES))?),
@@ -151,6 +152,12 @@ impl<'a> Results<'a> {
             if let Some(times) = &mut times {
                 write_line(times, [&cells[0], &TableCell::Number(run_time_s)])?;
             }
+            rows += 1;
+            // The last column says why there is no result.
+            if let Some(TableCell::Word(why)) = cells.last() {
+                without_results += 1;
+                fault.get_or_insert_with(|| why.clone());
+            }
             also(&cells);
             parquet.push(cells)
         };
@@ -158,7 +165,39 @@ impl<'a> Results<'a> {
         csv.commit()?;
         times.map_or(Ok(()), OutputFile::commit)?;
         parquet.finish().map_err(failed)?.commit()?;
-        Ok(missing)
+        Ok(WrittenTable {
+            missing,
+            without_results,
+            fault: fault.filter(|_| without_results == rows),
+        })
+    }
+}
+
+/// What stands in a table that has been written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct WrittenTable {
+    /// Points that have no row.
+    pub missing: u64,
+    /// Rows that say why there is no result.
+    pub without_results: u64,
+    /// Why the first row has no result, if no row has one.
+    pub fault: Option<String>,
+}
+
+impl WrittenTable {
+    /// Complains of a study whose settings are wrong at every point.
+    ///
+    /// # Errors
+    /// Why the first point has no result, if no point has one.
+    pub fn check(&self, study: &Study) -> Result<(), InputError> {
+        match &self.fault {
+            Some(why) => {
+                let message = format!("no point has a result: {why}");
+                Err(InputError::new(&study.name, message))
+            }
+            None => Ok(()),
+        }
     }
 }
 

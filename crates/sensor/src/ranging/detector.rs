@@ -329,16 +329,9 @@ impl Detector {
 /// Counts that bins would have without an echo, with the background of most bins. Laser cycles whose first event came before a bin
 /// do not count there.
 fn dark_counts(law: &OtherBins, response: &Response, counts: &[u32], all_parts: u32) -> Vec<f64> {
-    let cycles = f64::from(all_parts) / law.parts;
-    let mut left = cycles;
-    let open = counts.iter().map(|&count| {
-        let open = left.max(1e-3 * cycles);
-        if law.first_only {
-            left -= f64::from(count);
-        }
-        open
-    });
-    let open: Vec<f64> = open.collect();
+    let real: Vec<f64> = counts.iter().map(|&count| f64::from(count)).collect();
+    let open = response.reached(&real, f64::from(all_parts));
+    let open: Vec<f64> = open.iter().map(|parts| parts / law.parts).collect();
     let chances = |(bin, &count): (usize, &u32)| {
         let length = law.edges[bin + 1] - law.edges[bin];
         let known = law.known.get(bin).map_or(0.0, |known| known / law.parts) / length;

@@ -84,7 +84,7 @@ pub struct EchoFinder {
     scan: Scan,
     /// Counts at which bins stop counting, where they can be reached.
     full: Option<u32>,
-    /// Counts from which on a bin may have wrapped, or be about to: half of those that it has bits for.
+    /// Counts from which on a bin may have wrapped, or be about to: half of those that it has bits for (chosen).
     may_wrap: Option<u32>,
     walk: Option<Result<WalkCorrection, WalkLeft>>,
     /// Laser cycles, where bins that do not count are what an echo makes.

@@ -38,13 +38,7 @@ pub(super) fn count_alike(bench: &Bench, checks: &mut Checks) {
     }
     let end = origin + exposure.stop(CYCLES);
     let half_periods = 2 * CYCLES * stop_periods;
-    let clk_origin = origin - exposure.stop_phase;
-    drives.clock(
-        bench.clk,
-        exposure.clock,
-        clk_origin,
-        (-BEFORE, half_periods),
-    );
+    bench.drive_clk(&mut drives, &exposure, (-BEFORE, half_periods));
     let mut recorder = Recorder::new([bench.local_stop]);
     bench.rig.run(drives, end, &mut recorder);
 

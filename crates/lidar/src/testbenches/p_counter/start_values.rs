@@ -38,8 +38,7 @@ pub(super) fn ripple(bench: &Bench, checks: &mut Checks) {
             period += first.unwrap_or(0) + 2 * late + after_borrow;
         }
     }
-    let clk_origin = bench.origin - exposure.stop_phase;
-    drives.clock(bench.clk, exposure.clock, clk_origin, (0, 2 * period));
+    bench.drive_clk(&mut drives, &exposure, (0, 2 * period));
     let counter_out = bench.inner.iter().flat_map(|[_, out]| out.iter().copied());
     let mut recorder = Recorder::new(counter_out.chain([bench.local_stop]));
     bench.rig.run(drives, falling_clk(period), &mut recorder);

@@ -10,8 +10,8 @@
 use glam::DVec3;
 
 use super::meeting::Meeting;
-use super::round::{SIDE, between_ends};
-use super::surface::{Surface, turned_back};
+use super::round::{SIDE, about_axis, between_ends, off_axis};
+use super::surface::Surface;
 use crate::scene::vector::Ray;
 
 /// A cone where it stands.
@@ -44,7 +44,7 @@ impl Cone {
     }
 
     fn off_axis(&self, vector: DVec3) -> DVec3 {
-        vector - self.axis * vector.dot(self.axis)
+        off_axis(vector, self.axis)
     }
 
     /// Where a line is inside the endless cone, on the side of its tip that is used.
@@ -114,17 +114,11 @@ impl Surface for Cone {
 
     /// Around the side and along it, or across an end.
     fn on_surface(&self, point: DVec3, part: u32, seen_turned_deg: f64) -> (f64, f64) {
-        let offset = turned_back(point - self.centre_m, seen_turned_deg);
-        let axis = turned_back(self.axis, seen_turned_deg);
-        let (side, other) = axis.any_orthonormal_pair();
-        let (x, y) = (offset.dot(side), offset.dot(other));
+        let (x, y, along) = about_axis(point - self.centre_m, self.axis, seen_turned_deg);
         match part {
             SIDE => {
                 let slant = libm::hypot(1.0, self.slope);
-                (
-                    libm::hypot(x, y) * libm::atan2(y, x),
-                    offset.dot(axis) * slant,
-                )
+                (libm::hypot(x, y) * libm::atan2(y, x), along * slant)
             }
             _ => (x, y),
         }

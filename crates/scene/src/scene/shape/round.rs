@@ -23,6 +23,19 @@ pub(super) fn meet_sphere(ray: &Ray, centre_m: DVec3, radius_m: f64) -> Option<M
     Some(Meeting { range_m, part: 0 })
 }
 
+/// What of a vector is at right angles to an axis of unit length.
+pub(super) fn off_axis(vector: DVec3, axis: DVec3) -> DVec3 {
+    vector - axis * vector.dot(axis)
+}
+
+/// Across an axis of unit length, two ways, and along it: where `offset` lies, of a shape that is seen turned.
+pub(super) fn about_axis(offset: DVec3, axis: DVec3, seen_turned_deg: f64) -> (f64, f64, f64) {
+    let offset = turned_back(offset, seen_turned_deg);
+    let axis = turned_back(axis, seen_turned_deg);
+    let (side, other) = axis.any_orthonormal_pair();
+    (offset.dot(side), offset.dot(other), offset.dot(axis))
+}
+
 /// A sphere where it stands.
 #[derive(Debug)]
 pub(in crate::scene) struct Ball {
@@ -71,10 +84,6 @@ impl Cylinder {
             height_m,
         }
     }
-
-    fn off_axis(&self, vector: DVec3) -> DVec3 {
-        vector - self.axis * vector.dot(self.axis)
-    }
 }
 
 impl Surface for Cylinder {
@@ -85,26 +94,23 @@ impl Surface for Cylinder {
 
     fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
         match part {
-            SIDE => self.off_axis(point - self.centre_m).normalize(),
+            SIDE => off_axis(point - self.centre_m, self.axis).normalize(),
             _ => self.axis,
         }
     }
 
     fn bend(&self, _point: DVec3, part: u32, step_m: DVec3) -> DVec3 {
         match part {
-            SIDE => self.off_axis(step_m) / self.radius_m,
+            SIDE => off_axis(step_m, self.axis) / self.radius_m,
             _ => DVec3::ZERO,
         }
     }
 
     /// Around the side and along it, or across an end.
     fn on_surface(&self, point: DVec3, part: u32, seen_turned_deg: f64) -> (f64, f64) {
-        let offset = turned_back(point - self.centre_m, seen_turned_deg);
-        let axis = turned_back(self.axis, seen_turned_deg);
-        let (side, other) = axis.any_orthonormal_pair();
-        let (x, y) = (offset.dot(side), offset.dot(other));
+        let (x, y, along) = about_axis(point - self.centre_m, self.axis, seen_turned_deg);
         match part {
-            SIDE => (self.radius_m * libm::atan2(y, x), offset.dot(axis)),
+            SIDE => (self.radius_m * libm::atan2(y, x), along),
             _ => (x, y),
         }
     }
@@ -113,8 +119,10 @@ impl Surface for Cylinder {
 /// Ranges at which a line enters and leaves the endless cylinder of `radius_m` about the axis (of unit length) through
 /// `from_m`; `None` if it never does, infinite where it stays inside.
 fn pierced(ray: &Ray, from_m: DVec3, axis: DVec3, radius_m: f64) -> Option<(f64, f64)> {
-    let flat = |v: DVec3| v - axis * v.dot(axis);
-    let (offset, direction) = (flat(ray.origin - from_m), flat(ray.direction));
+    let (offset, direction) = (
+        off_axis(ray.origin - from_m, axis),
+        off_axis(ray.direction, axis),
+    );
     let (a, b) = (direction.length_squared(), offset.dot(direction));
     let c = offset.length_squared() - radius_m * radius_m;
     if a < 1e-24 {
