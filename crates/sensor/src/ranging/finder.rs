@@ -17,7 +17,7 @@ use std::ops::Range;
 use super::expected::{EchoLight, Response};
 use super::peak::{Peak, PeakOptions, interpolate_at, median};
 use super::returns::{CountStretch, Others, Search, WindowReturn};
-use super::walk::{CorrectedPeak, WalkCorrection, WalkLeft};
+use super::walk::{CorrectedPeak, MOST_BOUND_BINS, WalkCorrection, WalkLeft};
 use crate::chip::{Overflow, Tdc, WindowLaw};
 use crate::photon::EchoWidth;
 use crate::theory::significance::{Scan, Stretch};
@@ -90,10 +90,6 @@ pub struct EchoFinder {
     /// Laser cycles, where bins that do not count are what an echo makes.
     uncounted_of: Option<u32>,
 }
-
-/// Where each SPAD has a photon of the echo, counts may not tell its place. If the bound is more than this many bins,
-/// the error no longer follows the bound (measured at 10² to 10⁴ photons).
-const MOST_BOUND_BINS: f64 = 0.25;
 
 /// Photons for each SPAD above which the few bins that count under a THRESHOLD no longer tell the place to the bound: of 1000 walls at
 /// 4.5·10³ and 10⁴ photons up to 69 were beyond five bounds, at 900 none.

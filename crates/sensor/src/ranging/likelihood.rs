@@ -120,11 +120,11 @@ impl Likelihood<'_> {
         2.0 * missing(&self.counts[self.bins.clone()], &values, self.cycles)
     }
 
-    /// The deviances of some lights, about.
-    pub(super) fn deviances(&self, lights: &[EchoLight]) -> Vec<f64> {
+    /// The deviances of some lights.
+    pub(super) fn deviances(&self, lights: &[EchoLight], steps: Steps) -> Vec<f64> {
         let mut deviances = Vec::with_capacity(lights.len());
         self.response
-            .chances_of_each::<0>(lights, Steps::Coarse, |_, chances| {
+            .chances_of_each::<0>(lights, steps, |_, chances| {
                 deviances.push(self.deviance_of(chances));
             });
         deviances
@@ -179,14 +179,14 @@ impl Likelihood<'_> {
         self.maximise_each(&[*start]).remove(0)
     }
 
-    /// The same near each of some starts.
+    /// The same near each of some starts: first with the fewest steps.
     pub(super) fn maximise_each(&self, starts: &[EchoLight]) -> Vec<Fit> {
-        self.refined_each(&self.near_each(starts))
+        self.refined_each(&self.near_each(starts, Steps::Coarse))
     }
 
-    /// The same, about: with the fewest steps.
-    pub(super) fn near_each(&self, starts: &[EchoLight]) -> Vec<Fit> {
-        self.maximise_in(starts, Steps::Coarse, CLOSE)
+    /// The same in such steps.
+    pub(super) fn near_each(&self, starts: &[EchoLight], steps: Steps) -> Vec<Fit> {
+        self.maximise_in(starts, steps, CLOSE)
     }
 
     /// The least deviance near a start, about, and a light that nearly has it: what is missing to it is reckoned from the slopes.

@@ -18,8 +18,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use self::many_starts::with_rivals;
-use super::expected::{EchoLight, Response};
+use self::many_starts::{has_another, with_rivals};
+use super::expected::{EchoLight, Response, Steps};
 use super::likelihood::{
     ECHO, Fit, Free, IN_REGION, Likelihood, OF_A_WIDTH, WIDE_ECHO, WIDE_IN_REGION,
 };
@@ -39,6 +39,10 @@ const SHARP: f64 = 20.0;
 
 /// Share of the laser cycles that must reach a bin to tell the background: chosen.
 const WELL_REACHED: f64 = 0.02;
+
+/// Where each SPAD has a photon of the echo, counts may not tell its place. If the bound is more than this many bins,
+/// the error no longer follows the bound (measured at 10² to 10⁴ photons).
+pub(super) const MOST_BOUND_BINS: f64 = 0.25;
 
 /// Standard deviation with which a deep echo is sought, bins: chosen.
 const DEEP_BINS: f64 = 2.5;
@@ -67,7 +71,7 @@ pub enum WalkLeft {
     CutEcho,
     /// Bins are full, or light is so strong that its counts tell only the bin that it came in.
     ToABin,
-    /// Two different lights give such counts.
+    /// Two different lights, more than a bin apart, give such counts; under a THRESHOLD, nearer ones too.
     Ambiguous,
     /// No most likely light was found.
     NotConverged,
@@ -214,7 +218,7 @@ impl WalkCorrection {
     /// What is told of the lights that explain the counts, the most likely first.
     ///
     /// # Errors
-    /// As `widened`.
+    /// As `widened`, and lights that explain the counts from places more than a bin apart.
     fn corrected_peak(
         &self,
         wide: &Likelihood<'_>,
@@ -224,13 +228,20 @@ impl WalkCorrection {
         if self.is_short(&fits[0]) {
             return Ok(averaged(wide, fits, &widened).into());
         }
-        if !self.is_sharp(&fits[0]) {
+        let is_one = !has_another(fits);
+        if is_one && !self.is_sharp(&fits[0]) {
             return Ok(widened.into());
         }
         // The most likely place is less off on average than the mean of all, and its curvature says too little.
         let mean = averaged(wide, fits, &widened);
         let off = mean.light.position_bins - widened.light.position_bins;
         let bound_bins = libm::hypot(mean.bound_bins, off).max(widened.bound_bins);
+        // What follows an echo before the window may be a weak one within it.
+        let is_before = widened.light.position_bins < -0.5;
+        let most_bins = if is_before { MOST_BOUND_BINS } else { 1.0 };
+        if bound_bins > most_bins && (is_before || !is_one) {
+            return Err(WalkLeft::Ambiguous);
+        }
         Ok(Fit {
             bound_bins,
             ..widened
@@ -296,7 +307,10 @@ impl WalkCorrection {
             ..all
         });
         let lights: Vec<EchoLight> = lights.collect();
-        let judged = likelihood.deviances(&lights).into_iter().zip(lights);
+        let judged = likelihood
+            .deviances(&lights, Steps::Coarse)
+            .into_iter()
+            .zip(lights);
         let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
         best.map(|(_, light)| light)
     }
@@ -405,7 +419,7 @@ impl WalkCorrection {
             background_per_bin: share * likelihood.most_background,
             ..best.light
         });
-        let near = held.near_each(&starts);
+        let near = held.near_each(&starts, Steps::Coarse);
         let lights: Vec<EchoLight> = near.iter().map(|fit| fit.light).collect();
         let mut fits = vec![best];
         fits.extend(likelihood.maximise_each(&lights));

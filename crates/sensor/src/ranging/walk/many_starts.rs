@@ -6,11 +6,9 @@
 //!
 //! Strong light leaves the rising edge and little else, so that a weaker echo here and a stronger one there may explain the same counts.
 
-use std::ops::Range;
-
 use super::{WalkCorrection, WalkLeft};
 use crate::chip::EventType;
-use crate::ranging::expected::EchoLight;
+use crate::ranging::expected::{EchoLight, Steps};
 use crate::ranging::likelihood::{BESIDE, Fit, Likelihood};
 use crate::ranging::peak::Peak;
 use crate::ranging::pulse::share_before;
@@ -23,86 +21,74 @@ const ELSEWHERE: f64 = 4.0;
 /// Deviance by which another light may be less likely and still be within a standard deviation.
 const RIVAL: f64 = 1.0;
 
-/// How much more the deviance of a fit with the fewest steps may be than the least of them before it is not refined. Of 3100 random
-/// lights the best and those as good as it had at most 20 more, where a third of all fits had more than 30. With a
-/// THRESHOLD it was up to 28 000, and all are refined.
+/// How much more the deviance of a fit may be than the least of them before it is left out. Of 3100 random lights the best of those with the
+/// fewest steps, and those as good as it, had at most 20 more, where a third of all had more than 30. With a THRESHOLD it was up to 28 000,
+/// and none is left out.
 const FAR: f64 = 30.0;
 
+/// Decades from signal to signal where each leads to a light of its own.
+const FINE: f64 = 0.1;
+
 impl WalkCorrection {
-    /// The best of fits from many starts: for each of many signals the best place. Behind it are the others, where pulses are short.
+    /// Fits from many starts, the best first: for each of many signals the best place. Under a THRESHOLD the best alone.
+    ///
+    /// # Errors
+    /// Under a THRESHOLD, two lights that explain the counts from different places.
     pub(super) fn of_many(
         &self,
         likelihood: &Likelihood<'_>,
         (peak, background_per_bin): (&Peak, f64),
     ) -> Result<Vec<Fit>, WalkLeft> {
-        let sigma_bins = self.response.pulse_sigma_bins;
         let edge = self.rising_edge(likelihood, background_per_bin);
         let has_threshold = self.response.counting.threshold > 0;
-        let is_short = self.has_short_pulses();
-        let edge_is_seen = |bin: usize| bin as f64 > 1.0 + sigma_bins;
-        let mut lights: Vec<EchoLight> = Vec::new();
-        let mut of_signal: Vec<Range<usize>> = Vec::new();
+        let follows_edge = edge.is_some_and(|(bin, _)| self.edge_is_seen(bin)) && !has_threshold;
+        let near = |steps: Steps, step: f64, fits: usize| {
+            let places = |signal: f64| {
+                let places = self.places(edge, peak.peak_bin, signal).into_iter();
+                let light = |position_bins| EchoLight {
+                    position_bins,
+                    signal,
+                    background_per_bin,
+                    sigma_bins: self.response.pulse_sigma_bins,
+                };
+                places.map(light).collect()
+            };
+            let mut starts = best_of_each(likelihood, steps, step, places);
+            // Those between lead to the same light.
+            if step == FINE {
+                starts = least_of(&starts);
+            }
+            starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let starts = starts.iter().take(fits).map(|(_, start)| *start);
+            let mut near: Vec<Fit> = Vec::new();
+            for fit in likelihood.near_each(&starts.collect::<Vec<_>>(), steps) {
+                add_new(&mut near, fit);
+            }
+            if has_threshold { near } else { likely(near) }
+        };
         // Where light makes bins count less, too, each light has its own places.
-        let (step, fits) = match edge {
-            Some((bin, _)) if edge_is_seen(bin) && is_short => (0.1, 4),
-            Some((bin, _)) if edge_is_seen(bin) && !has_threshold => (0.4, 2),
+        let (step, most_fits) = match edge {
+            Some(_) if follows_edge && self.has_short_pulses() => (FINE, 4),
+            Some(_) if follows_edge => (0.4, 2),
             // With a THRESHOLD few bins count, and several lights may explain them: with 8 fits for 24, one more depth of 512 was a hundredth of its bound beside.
             Some(_) if has_threshold => (0.2, 8),
             Some(_) => (0.2, 24),
             None => (0.2, 8),
         };
-        for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
-            let signal = libm::pow(10f64, step * f64::from(number));
-            let light = |position_bins: f64| EchoLight {
-                position_bins,
-                signal,
-                background_per_bin,
-                sigma_bins,
+        let mut fits = likelihood.refined_each(&near(Steps::Coarse, step, most_fits));
+        // The fewest steps take strong light for some other.
+        let is_told = |fit: &Fit| fit.explains() && !self.is_sharp(fit);
+        if !has_threshold && !fits.iter().any(is_told) {
+            let (step, most_fits) = if follows_edge {
+                (FINE, 4)
+            } else {
+                (step, most_fits)
             };
-            let places: Vec<f64> = match edge {
-                // The light until the end of the edge's bin says how much of the pulse has come.
-                Some((bin, photons)) if edge_is_seen(bin) => {
-                    let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
-                    let beside: &[f64] = if is_short {
-                        &[-0.3, -sigma_bins, 0.0, sigma_bins, 0.3]
-                    } else {
-                        &[-0.3, 0.0, 0.3]
-                    };
-                    beside.iter().map(|off| end + off).collect()
-                }
-                Some(_) => (-12..=12)
-                    .map(|n| 0.3 * f64::from(n))
-                    .filter(|place| *place >= -BESIDE * sigma_bins)
-                    .collect(),
-                None => (-10..=40)
-                    .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
-                    .collect(),
-            };
-            let first = lights.len();
-            lights.extend(places.into_iter().map(light));
-            of_signal.push(first..lights.len());
+            for fit in near(Steps::Fine, step, most_fits) {
+                add_new(&mut fits, fit);
+            }
+            fits = likely(fits);
         }
-        let deviances = likelihood.deviances(&lights);
-        let judged = |at: usize| (deviances[at], lights[at]);
-        let best_of = |range: Range<usize>| range.map(judged).min_by(|a, b| a.0.total_cmp(&b.0));
-        let mut starts: Vec<(f64, EchoLight)> = of_signal.into_iter().filter_map(best_of).collect();
-        if is_short {
-            starts = least_of(&starts);
-        }
-        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut near: Vec<Fit> = Vec::new();
-        let starts = starts.iter().take(fits).map(|(_, start)| *start);
-        for fit in likelihood.near_each(&starts.collect::<Vec<_>>()) {
-            add_new(&mut near, fit);
-        }
-        let least = near
-            .iter()
-            .map(|fit| fit.deviance)
-            .fold(f64::INFINITY, f64::min);
-        near.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
-        let may_win = |fit: &&Fit| has_threshold || fit.deviance < least + FAR;
-        let near: Vec<Fit> = near.iter().filter(may_win).copied().collect();
-        let mut fits = likelihood.refined_each(&near);
         // Those that have converged first, then the most likely. Under a THRESHOLD the most likely may converge slowly.
         let is_behind = |fit: &Fit| !has_threshold && !fit.has_converged;
         fits.sort_by(|a, b| {
@@ -110,22 +96,40 @@ impl WalkCorrection {
             behind.then(a.deviance.total_cmp(&b.deviance))
         });
         let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
-        if is_short {
+        if !has_threshold {
             return Ok(fits);
         }
-        let is_another = |fit: &Fit| {
-            let off = (fit.light.position_bins - best.light.position_bins).abs();
-            fit.deviance < best.deviance + AS_GOOD
-                && off > ELSEWHERE * best.bound_bins.max(fit.bound_bins)
-        };
-        if fits.iter().filter(|fit| fit.has_converged).any(is_another) {
+        if has_another(&fits) {
             return Err(WalkLeft::Ambiguous);
         }
-        Ok(vec![if has_threshold {
-            with_rivals(best, &fits, likelihood)
+        Ok(vec![with_rivals(best, &fits, likelihood)])
+    }
+
+    /// Whether an echo whose edge is in this bin begins within the window.
+    fn edge_is_seen(&self, bin: usize) -> bool {
+        bin as f64 > 1.0 + self.response.pulse_sigma_bins
+    }
+
+    /// Places at which an echo of `signal` photons may lie.
+    fn places(&self, edge: Option<(usize, f64)>, peak_bin: usize, signal: f64) -> Vec<f64> {
+        let sigma_bins = self.response.pulse_sigma_bins;
+        let Some((bin, photons)) = edge else {
+            let places = (-10..=40).map(|n| 0.15 * f64::from(n) * (1.0 + sigma_bins));
+            return places.map(|off| peak_bin as f64 + off).collect();
+        };
+        // The light until the end of the edge's bin says how much of the pulse has come.
+        let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
+        let beside: &[f64] = if self.has_short_pulses() {
+            &[-0.3, -sigma_bins, 0.0, sigma_bins, 0.3]
         } else {
-            best
-        }])
+            &[-0.3, 0.0, 0.3]
+        };
+        let mut places: Vec<f64> = beside.iter().map(|off| end + off).collect();
+        if !self.edge_is_seen(bin) {
+            let early = (-12..=12).map(|n| 0.3 * f64::from(n));
+            places.extend(early.filter(|place| *place >= -BESIDE * sigma_bins));
+        }
+        places
     }
 
     /// The first bin of an echo's rising edge, and the photons of the echo until its end. Of a full bin these are not known: where pulses are
@@ -156,6 +160,33 @@ impl WalkCorrection {
     }
 }
 
+/// The best place of each of many signals, and its deviance.
+fn best_of_each(
+    likelihood: &Likelihood<'_>,
+    steps: Steps,
+    step: f64,
+    places: impl Fn(f64) -> Vec<EchoLight>,
+) -> Vec<(f64, EchoLight)> {
+    let numbers = (-0.6 / step) as i32..=(4.0 / step) as i32;
+    let signals = numbers.map(|number| libm::pow(10f64, step * f64::from(number)));
+    let of_each: Vec<Vec<EchoLight>> = signals.map(places).collect();
+    let mut deviances = likelihood.deviances(&of_each.concat(), steps).into_iter();
+    let best_of = |lights: &Vec<EchoLight>| {
+        let judged = lights.iter().copied().zip(deviances.by_ref());
+        let best = judged.min_by(|a, b| a.1.total_cmp(&b.1));
+        best.map(|(light, deviance)| (deviance, light))
+    };
+    of_each.iter().filter_map(best_of).collect()
+}
+
+/// The fits that are not much less likely than the best.
+fn likely(mut fits: Vec<Fit>) -> Vec<Fit> {
+    let deviances = fits.iter().map(|fit| fit.deviance);
+    let least = deviances.fold(f64::INFINITY, f64::min);
+    fits.retain(|fit| fit.deviance < least + FAR);
+    fits
+}
+
 /// Starts of signals in a row that are better than their neighbours: those between lead to the same light.
 fn least_of(starts: &[(f64, EchoLight)]) -> Vec<(f64, EchoLight)> {
     let deviance = |at: usize| starts.get(at).map_or(f64::INFINITY, |start| start.0);
@@ -178,6 +209,17 @@ pub(super) fn quantile(share: f64) -> f64 {
         }
     }
     0.5 * (low + high)
+}
+
+/// Whether another light than the first one explains the counts about as well from elsewhere.
+pub(super) fn has_another(fits: &[Fit]) -> bool {
+    let best = fits[0];
+    let is_another = |fit: &Fit| {
+        let off = (fit.light.position_bins - best.light.position_bins).abs();
+        fit.deviance < best.deviance + AS_GOOD
+            && off > ELSEWHERE * best.bound_bins.max(fit.bound_bins)
+    };
+    fits.iter().filter(|fit| fit.has_converged).any(is_another)
 }
 
 /// The best fit, with a bound that reaches to every other light with which the counts are about as likely.
