@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from operator import index
 from os import PathLike
 from typing import Any, TypeAlias
 
@@ -19,10 +20,14 @@ Policy: TypeAlias = str | Mapping[str, Any] | None
 
 
 def sensor_of(sensor: SensorLike) -> Sensor:
+    if not isinstance(sensor, Sensor | str | PathLike | None):
+        raise InputError(f"sensor: {sensor!r} is none; give a Sensor, the name of a built-in one or a file")
     return sensor if isinstance(sensor, Sensor) else Sensor(sensor)
 
 
 def scene_of(scene: SceneLike) -> Scene:
+    if not isinstance(scene, Scene | str | PathLike | None):
+        raise InputError(f"scene: {scene!r} is none; give a Scene, the name of a built-in one or a file")
     return scene if isinstance(scene, Scene) else Scene(scene)
 
 
@@ -33,8 +38,8 @@ def guide_of(guide: GuideLike) -> Guide | None:
         return Guide(guide)
     if isinstance(guide, np.ndarray):
         return Guide.from_map(guide)
-    if not all(isinstance(one, Guide | str) for one in guide):
-        raise InputError("guide: is a list of what are no guides; give texts or Guides, or a map as an array of NumPy")
+    if not isinstance(guide, Iterable) or not all(isinstance(one, Guide | str) for one in guide):
+        raise InputError(f"guide: {guide!r} is none; give texts or Guides, or a map as an array of NumPy")
     return Guide(*guide)
 
 
@@ -50,6 +55,25 @@ def policy_of(windows: Policy) -> str:
         return str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
 
     return ",".join(f"{key}={text(value)}" for key, value in windows.items())
+
+
+def count(name: str, value: int, largest: int = 2**32 - 1) -> int:
+    """A whole number from 0 on."""
+    try:
+        number = index(value)
+    except TypeError:
+        number = -1
+    if not 0 <= number <= largest:
+        raise InputError(f"{name}: {value!r} is impossible; give a whole number, 0 to {largest}")
+    return number
+
+
+def seed_of(seed: int) -> int:
+    return count("seed", seed, 2**64 - 1)
+
+
+def periods_of(stop_periods: int, laser_cycles: int) -> tuple[int, int]:
+    return count("stop_periods", stop_periods), count("laser_cycles", laser_cycles)
 
 
 def whole(name: str, values: ArrayLike) -> NDArray[np.int64]:

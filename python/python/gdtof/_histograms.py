@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _gdtof
-from ._arguments import SceneLike, SensorLike, numbers, real, scene_of, sensor_of, starts_of, whole
+from ._arguments import SceneLike, SensorLike, numbers, periods_of, real, scene_of, seed_of, sensor_of, starts_of, whole
 from ._frame import Engine, _path
 from .errors import InputError
 
@@ -161,8 +161,8 @@ def expose(
         echoes(arrivals),
         None if sigmas is None else echoes(sigmas),
         profile,
-        (stop_periods, laser_cycles),
-        seed,
+        periods_of(stop_periods, laser_cycles),
+        seed_of(seed),
         engine,
         progress,
     )
@@ -233,7 +233,7 @@ def replay(
         column("time_fs", time_fs),
         column("pixel", pixel),
         column("spad", spad),
-        (stop_periods, laser_cycles),
+        periods_of(stop_periods, laser_cycles),
         engine,
         _path(waves),
         progress,
@@ -283,7 +283,7 @@ def range(
         scene_of(scene),
         counts,
         starts_of(starts, chip),
-        (stop_periods, laser_cycles),
+        periods_of(stop_periods, laser_cycles),
         float(false_alarm_rate),
         correct_walk,
         _path(calibration),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _gdtof
-from ._arguments import SceneLike, SensorLike, scene_of, sensor_of
+from ._arguments import SceneLike, SensorLike, count, periods_of, scene_of, seed_of, sensor_of
 from ._gdtof import Scene, Sensor
 
 
@@ -105,8 +105,8 @@ class Light:
             self._scene,
             *self._asked,
             period_ns,
-            (stop_periods, laser_cycles),
-            seed,
+            periods_of(stop_periods, laser_cycles),
+            seed_of(seed),
             progress,
         )
         drawn["laser_cycle"] = drawn["laser_cycle"].astype(np.int64)
@@ -146,5 +146,5 @@ def light(
         What cannot be, and what would help.
     """
     chip, world = sensor_of(sensor), scene_of(scene)
-    means = _gdtof.light(chip, world, spads, fov_deg)
+    means = _gdtof.light(chip, world, None if spads is None else count("spads", spads), fov_deg)
     return Light(**means, _sensor=chip, _scene=world, _asked=(spads, fov_deg))
