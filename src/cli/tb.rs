@@ -13,7 +13,7 @@ use super::asked::WaveFormatOption;
 use super::voice::{complain, note, notes, progress, say_json, say_unless_quiet};
 use crate::chip::SensorConfig;
 use crate::files::{InputError, ResultSet, clean_up_when_interrupted, instead_of};
-use crate::report::{Checks, Grid};
+use crate::report::{CheckedValue, Checks, Grid};
 use crate::testbenches::{TESTBENCHES, Testbench};
 use crate::waves::WaveFormat;
 
@@ -75,6 +75,7 @@ struct RunResult {
     passed: bool,
     checked: usize,
     failed: usize,
+    failures: Vec<CheckedValue>,
     run_time_s: f64,
     waveform: PathBuf,
     #[serde(skip)]
@@ -230,6 +231,7 @@ fn run_one(
         passed: checks.passed(),
         checked: checks.count(),
         failed: checks.failed(),
+        failures: checks.failures().cloned().collect(),
         run_time_s: begin.elapsed().as_secs_f64(),
         waveform: waves.out.join(file),
         checks,

@@ -93,6 +93,7 @@ fn those_named_run_and_list_runs_none() {
         (&entries[0]["passed"], &entries[0]["failed"]),
         (&true.into(), &0.into())
     );
+    assert_eq!(entries[0]["failures"], serde_json::json!([]));
     assert_eq!(files(&out, ".fst"), ["tb_p_counter.fst"]);
 }
 

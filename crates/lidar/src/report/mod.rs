@@ -31,4 +31,4 @@ pub(crate) use pattern::SMALLEST_TILED_CELL_PX;
 pub use pattern::{Category, Pattern};
 pub use series::{Series, Style};
 pub use table::Table;
-pub use verdicts::Checks;
+pub use verdicts::{CheckedValue, Checks};

@@ -2,21 +2,29 @@
 
 use std::fmt;
 
+use serde::Serialize;
+
 use crate::units::Time;
 
 /// The checks of one testbench, in the order in which they were made.
 #[derive(Debug, Clone, Default)]
 pub struct Checks {
     notes: Vec<String>,
-    lines: Vec<Line>,
+    lines: Vec<CheckedValue>,
 }
 
-#[derive(Debug, Clone)]
-struct Line {
-    what: String,
-    expected: String,
-    found: String,
-    holds: bool,
+/// A value that was checked, in words.
+#[derive(Debug, Clone, Serialize)]
+pub struct CheckedValue {
+    /// What was looked at.
+    pub what: String,
+    /// What it should be.
+    pub expected: String,
+    /// What it is.
+    pub found: String,
+    /// Whether that is as it should be.
+    #[serde(skip)]
+    pub holds: bool,
 }
 
 impl Checks {
@@ -56,7 +64,7 @@ impl Checks {
         found: impl fmt::Display,
         holds: bool,
     ) {
-        self.lines.push(Line {
+        self.lines.push(CheckedValue {
             what: what.into(),
             expected: expected.to_string(),
             found: found.to_string(),
@@ -74,9 +82,14 @@ impl Checks {
         self.lines.len()
     }
 
+    /// The checks that failed.
+    pub fn failures(&self) -> impl Iterator<Item = &CheckedValue> {
+        self.lines.iter().filter(|line| !line.holds)
+    }
+
     /// How many checks failed.
     pub fn failed(&self) -> usize {
-        self.lines.iter().filter(|line| !line.holds).count()
+        self.failures().count()
     }
 
     /// Whether something was checked and nothing failed.
@@ -91,7 +104,7 @@ impl fmt::Display for Checks {
         for note in &self.notes {
             writeln!(f, "{note}")?;
         }
-        let width = |cell: fn(&Line) -> &str, title: &str| {
+        let width = |cell: fn(&CheckedValue) -> &str, title: &str| {
             let cells = self.lines.iter().map(|line| cell(line).chars().count());
             cells.max().unwrap_or(0).max(title.len())
         };
@@ -139,6 +152,11 @@ delay    1.000001 ns  1.000002 ns  FAILED\n\
 2 checked, 1 failed\n";
         assert_eq!(checks.to_string(), expected);
         assert!(!checks.passed());
+        let failures: Vec<&str> = checks
+            .failures()
+            .map(|failed| failed.what.as_str())
+            .collect();
+        assert_eq!(failures, ["delay"]);
     }
 
     #[test]

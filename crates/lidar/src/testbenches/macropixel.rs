@@ -64,7 +64,7 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     two_windows(&hslidar, &chip, HSLIDAR, "4.9.3", checks)?;
     photons::bin_edge(checks);
     photons::full_bins(checks);
-    photons::coincidences(&config(), checks);
+    photons::coincidences(&config(), (20, 32), checks);
     photons::cancelling_pulses(checks);
     Ok(())
 }
@@ -74,7 +74,7 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
     let sensor = driven(sensor);
     let starts = window_starts(&sensor)?;
     two_windows(waves, &sensor, starts, "Fig. 48", checks)?;
-    photons::coincidences(&sensor, checks);
+    photons::coincidences(&sensor, (starts[1], stop_periods(&sensor)), checks);
     Ok(())
 }
 

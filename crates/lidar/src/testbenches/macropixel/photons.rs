@@ -77,8 +77,11 @@ pub(super) fn full_bins(checks: &mut Checks) {
 }
 
 /// Bin b gets b coincident photons, and TYPE and THRESHOLD pick the bins.
-pub(super) fn coincidences(sensor: &SensorConfig, checks: &mut Checks) {
-    let start = 20;
+pub(super) fn coincidences(
+    sensor: &SensorConfig,
+    (start, stop_periods): (u16, u32),
+    checks: &mut Checks,
+) {
     let cases = [
         (EventType::Greater, 0),
         (EventType::Greater, 3),
@@ -95,11 +98,12 @@ pub(super) fn coincidences(sensor: &SensorConfig, checks: &mut Checks) {
             dead_time_ns: 1.0,
             ..sensor.clone()
         };
-        let exposure = Exposure::new(&config, 32, 1);
-        let is_possible = start <= config.largest_start() && config.check().is_ok();
-        // A block of one's own has the bins that it has.
-        let found = is_possible.then(|| find_window(&config, &exposure, start));
-        let Some((law, window)) = found.flatten() else {
+        // A block of one's own has the bins that it has, and no THRESHOLD exceeds the SPADs.
+        if config.check().is_err() {
+            continue;
+        }
+        let exposure = Exposure::new(&config, stop_periods, 1);
+        let Some((law, window)) = find_window(&config, &exposure, start) else {
             continue;
         };
         let spads = |bin: usize| (1u64 << bin) - 1;
