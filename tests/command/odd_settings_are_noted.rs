@@ -199,6 +199,36 @@ fn a_filter_for_another_laser_is_noted() {
     }
 }
 
+/// A strong laser brings more light back from a retroreflector than is modelled, and a weak one does not.
+#[test]
+fn light_beyond_the_model_is_counted() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let scene = "[[object]]\nname = \"sign\"\nkind = \"plane\"\ncentre_m = [0, 0, 20]\nwidth_m = 100\nheight_m = 100\nreflectivity = 0.5\n";
+    std::fs::write(here.join("sign.toml"), scene).unwrap();
+    let frame = "frame --scene sign.toml --rows 2 --cols 2 --guide truth --laser-cycles 50 --probe none --out sign";
+    let row = "macropixels with more light than is modelled";
+    for (energy_uj, count) in [("100", Some(4)), ("0.001", None)] {
+        let words = format!(
+            "{frame} --set scene.object.sign.retro=1000 --set scene.lidar.pulse_energy_uj={energy_uj}"
+        );
+        let (table, _) = said(here, &words);
+        let said = table.lines().find(|line| line.contains(row));
+        assert_eq!(
+            said.map(|line| line.contains("4 of 4")),
+            count.map(|_| true),
+            "{table}"
+        );
+        let text = std::fs::read(here.join("sign/frame.json")).unwrap();
+        let frame: Json = serde_json::from_slice(&text).unwrap();
+        assert_eq!(
+            frame.get("light_cut").and_then(Json::as_u64),
+            count,
+            "{energy_uj} uJ"
+        );
+    }
+}
+
 /// Counted again from the depths of frame.json.
 #[test]
 fn depths_of_smoke_itself_are_counted() {

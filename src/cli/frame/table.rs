@@ -47,6 +47,12 @@ pub(super) fn brief(
             part_of_whole(frame.depths_of_medium, summary.depths),
         );
     }
+    if frame.light_cut > 0 {
+        table.push(
+            "macropixels with more light than is modelled",
+            part_of_whole(frame.light_cut, summary.pixels),
+        );
+    }
     if let Some(why) = without_a_depth(&summary) {
         table.push("surfaces without a depth", why);
     }

@@ -117,6 +117,7 @@ impl<'a, P> FrameReport<'a, P> {
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
             depths_of_medium: frame.depths_of_medium,
+            light_cut: frame.light_cut,
             hints: &frame.hints,
             photons_expected: frame.photons_expected,
             work: frame.work,

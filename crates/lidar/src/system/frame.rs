@@ -31,7 +31,7 @@ use crate::engine::{
 };
 use crate::guide::{GuideInput, GuideMap};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
-use crate::scene::GroundTruth;
+use crate::scene::{GroundTruth, is_beyond_model};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
 mod at_gates;
@@ -171,6 +171,7 @@ struct FrameDepths {
     remark: Option<String>,
     hints: Vec<DepthHint>,
     depths_of_medium: usize,
+    light_cut: usize,
     took_s: f64,
 }
 
@@ -227,6 +228,7 @@ impl Plan<'_> {
             remark: ranged.remark,
             hints: ranged.hints,
             depths_of_medium: ranged.depths_of_medium,
+            light_cut: ranged.light_cut,
             photons_expected: light.photons_expected(exposure),
             work: counted.exposed.work,
             kept: counted.kept,
@@ -360,6 +362,11 @@ impl Plan<'_> {
             remark: circumstances.remark(),
             hints: circumstances.hints(),
             depths_of_medium: self.depths_of_medium(light, &depths, ranger.bin_s()),
+            light_cut: light
+                .each
+                .iter()
+                .filter(|light| is_beyond_model(light))
+                .count(),
             bin_s: ranger.bin_s(),
             depths,
             took_s: clock.lap(),

@@ -126,6 +126,8 @@ pub struct FrameResult<'a, P = ()> {
     pub(crate) hints: &'a [DepthHint],
     #[serde(skip_serializing_if = "is_zero")]
     pub(crate) depths_of_medium: usize,
+    #[serde(skip_serializing_if = "is_zero")]
+    pub(crate) light_cut: usize,
     pub(crate) photons_expected: f64,
     pub(crate) work: EngineWork,
     pub(crate) timing: &'a VerdictReport,

@@ -60,6 +60,9 @@ pub struct Frame {
     pub hints: Vec<DepthHint>,
     /// Depths that are light of fog or smoke itself: nearer than every surface that the macropixel sees, by more than a bin. 0 in clear air.
     pub depths_of_medium: usize,
+    /// Macropixels that would get more light than is modelled: [`MOST_PER_ECHO`](crate::scene::MOST_PER_ECHO) photons of an echo a laser cycle,
+    /// or [`MOST_BACKGROUND_HZ`](crate::scene::MOST_BACKGROUND_HZ) of background. What is beyond is left out.
+    pub light_cut: usize,
     /// Photons and dark counts that the light makes of the whole array on average.
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.

@@ -31,6 +31,15 @@ const MOST_PER_RAY: f64 = 1e12;
 /// Highest background rate that is modelled, far beyond saturation.
 pub const MOST_BACKGROUND_HZ: f64 = 1e11;
 
+/// Whether a macropixel would get more light than is modelled.
+pub fn is_beyond_model(light: &PixelLight) -> bool {
+    let has_bright = light.segments().any(|segment| {
+        let mut echoes = segment.echoes();
+        echoes.any(|echo| echo.photons >= MOST_PER_ECHO)
+    });
+    has_bright || light.background_hz() >= MOST_BACKGROUND_HZ
+}
+
 /// Femtoseconds that light takes for a metre there and back.
 const FLIGHT_FS_PER_M: f64 = 2e15 / SPEED_OF_LIGHT_M_PER_S;
 

@@ -46,7 +46,7 @@ pub use camera::PinholeCamera;
 pub use cast::{Hit, Stage};
 pub use curve::{Curve, CurveError, CurveSetting};
 pub use eye_safety::{Emission, EyeRule, EyeSafety, Train};
-pub use illumination::{MOST_BACKGROUND_HZ, MOST_PER_ECHO};
+pub use illumination::{MOST_BACKGROUND_HZ, MOST_PER_ECHO, is_beyond_model};
 pub use interferer::Interferer;
 pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
 pub use object::Object;
