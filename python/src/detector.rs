@@ -131,7 +131,8 @@ pub(crate) fn detector_range<'py>(
         }
         None => Vec::new(),
     };
-    let found = run(py, None, move |_| {
+    let (found, remark) = run(py, None, move |_| {
+        let remark = detector.remark_on_echoes(zones.iter().map(Vec::as_slice));
         let found = zones.par_iter().enumerate().map(|(number, zone)| {
             let crosstalk = crosstalk.get(number).cloned().unwrap_or_default();
             let detector = Detector {
@@ -140,9 +141,10 @@ pub(crate) fn detector_range<'py>(
             };
             detector.returns(zone, &options)
         });
-        Ok(found.collect::<Vec<_>>())
+        Ok((found.collect::<Vec<_>>(), remark))
     })?;
     let dict = PyDict::new(py);
+    dict.set_item("remark", remark)?;
     let nan = f64::NAN;
     for (name, number) in [
         ("depth", (|r| r.depth_m) as fn(&DetectedReturn) -> f64),

@@ -254,6 +254,15 @@ def test_what_is_no_number_is_refused_and_odd_units_are_warned_of() -> None:
     assert warned[0].filename == __file__
 
 
+def test_echoes_unlike_the_pulse_are_warned_of() -> None:
+    wide = gdtof.Detector(bins=48, bin_ns=BIN_NS, pulse_fwhm_ns=6 * FWHM_NS, start_ns=2.0)
+    counts = wide.expected(1.0 + 0.075 * 48 * BIN_NS, 5000, 480).round().astype(np.uint16)
+    with pytest.warns(UserWarning, match="wide at half maximum, .* times wider than pulse_fwhm_ns") as warned:
+        tof().range(counts)
+    assert warned[0].filename == __file__
+    wide.range(counts)
+
+
 def test_detectors_with_edges_are_equal_and_have_a_hash() -> None:
     edges = np.arange(65.0)
     one, other = (gdtof.Detector(64, pulse_fwhm_ns=2.0, bin_edges_ns=edges) for _ in "ab")

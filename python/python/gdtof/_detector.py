@@ -258,6 +258,8 @@ class Detector:
                 ) from None
             known = np.ascontiguousarray(light.reshape(-1, self.bins))
         found = _gdtof.detector_range(self._described(), zones, known, float(false_alarm_rate), correct_walk)
+        if found["remark"] is not None:
+            warnings.warn(found["remark"], UserWarning, stacklevel=2)
 
         def of_first(name: str) -> NDArray[np.float64]:
             return np.ascontiguousarray(found[name][:, 0]).reshape(shape)

@@ -1,6 +1,5 @@
 //! `gdtof range` of any sensor's histograms: tables, arrays, and logs of evaluation kits.
 
-use std::f64::consts::LN_2;
 use std::ops::Range;
 use std::path::Path;
 
@@ -19,12 +18,6 @@ use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate};
 use crate::system::median;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
-
-/// How many times wider or narrower than the stated pulse echoes are said to be unlike it: chosen. Slanted surfaces widen echoes, too.
-const UNLIKE: f64 = 2.0;
-
-/// Bins from which on an echo is longer than one: chosen.
-const CLEARLY_A_BIN: f64 = 1.25;
 
 /// Counts that two histograms do not share by chance.
 const TOO_MANY_FOR_CHANCE: u64 = 200;
@@ -112,9 +105,9 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         .flatten()
         .collect();
     if let Some(detector) = detectors.first()
-        && let Some(fwhm_s) = detector.echo_fwhm_s(histograms.histograms())
+        && let Some(remark) = detector.remark_on_echoes(histograms.histograms())
     {
-        note_unlike_pulse(&whole.detector, fwhm_s);
+        note(remark);
     }
     if let Some(path) = &args.out {
         write_csv(path, &zones)?;
@@ -129,31 +122,6 @@ pub(super) fn run(args: &RangeArgs, format: HistogramFormat) -> anyhow::Result<(
         table.push("zones with light of a cover glass", row);
     }
     Ok(say_unless_quiet(table)?)
-}
-
-/// Notes that echoes are far wider or narrower than the stated pulse.
-fn note_unlike_pulse(detector: &Detector, fwhm_s: f64) {
-    let stated_ns = 1e9 * detector.pulse_sigma_s * (8.0 * LN_2).sqrt();
-    let (seen_ns, bin_ns) = (1e9 * fwhm_s, 1e9 * detector.bin_s());
-    // What is shorter than a bin looks like a bin.
-    let is_wide = seen_ns > UNLIKE * stated_ns && seen_ns > CLEARLY_A_BIN * bin_ns;
-    let is_narrow = seen_ns.max(bin_ns) < stated_ns / UNLIKE;
-    if is_wide || is_narrow {
-        let times = if is_wide {
-            seen_ns / stated_ns
-        } else {
-            stated_ns / seen_ns
-        };
-        let than = if is_wide { "wider" } else { "narrower" };
-        let ratio = if times < 1000.0 {
-            format!("{times:.1} times {than}")
-        } else {
-            format!("far {than}")
-        };
-        note(format_args!(
-            "echoes are about {seen_ns:.1} ns wide at half maximum, {ratio} than pulse_fwhm_ns = {stated_ns:.3}; give the width of the echoes, with all jitter, so that depths and bounds hold"
-        ));
-    }
 }
 
 /// Zones whose histogram is that of the zone before them.

@@ -22,7 +22,39 @@ const ENOUGH: f64 = 300.0;
 /// Cells of the sum in a bin.
 const FINE: usize = 8;
 
+/// How many times wider or narrower than the stated pulse echoes are said to be unlike it: chosen. Slanted surfaces widen echoes, too.
+const UNLIKE: f64 = 2.0;
+
+/// Bins from which on an echo is longer than one: chosen.
+const CLEARLY_A_BIN: f64 = 1.25;
+
 impl Detector {
+    /// A sentence, where echoes in `histograms` are far wider or narrower than the stated pulse.
+    pub fn remark_on_echoes<'a>(
+        &self,
+        histograms: impl Iterator<Item = &'a [u32]>,
+    ) -> Option<String> {
+        let seen_ns = 1e9 * self.echo_fwhm_s(histograms)?;
+        let stated_ns = 1e9 * self.pulse_sigma_s * (8.0 * LN_2).sqrt();
+        let bin_ns = 1e9 * self.bin_s();
+        // What is shorter than a bin looks like a bin.
+        let is_wide = seen_ns > UNLIKE * stated_ns && seen_ns > CLEARLY_A_BIN * bin_ns;
+        let is_narrow = seen_ns.max(bin_ns) < stated_ns / UNLIKE;
+        let (times, than) = if is_wide {
+            (seen_ns / stated_ns, "wider")
+        } else {
+            (stated_ns / seen_ns, "narrower")
+        };
+        let ratio = if times < 1000.0 {
+            format!("{times:.1} times {than}")
+        } else {
+            format!("far {than}")
+        };
+        (is_wide || is_narrow).then(|| {
+            format!("echoes are about {seen_ns:.1} ns wide at half maximum, {ratio} than pulse_fwhm_ns = {stated_ns:.3}; give the width of the echoes, with all jitter, so that depths and bounds hold")
+        })
+    }
+
     /// The full width at half maximum of echoes in `histograms`, s; `None` without enough counts of echoes that lie within the bins.
     /// An echo shorter than half a bin has that half.
     pub fn echo_fwhm_s<'a>(&self, histograms: impl Iterator<Item = &'a [u32]>) -> Option<f64> {
