@@ -192,10 +192,11 @@ def test_copies_travel() -> None:
         (lambda: gdtof.replay([1], [0], [0], 100, laser_cycles=2**40), "laser_cycles: 1099511627776 is impossible"),
         (lambda: gdtof.range([[[1] * 16]], 100, stop_periods="520"), "stop_periods: '520' is impossible"),  # type: ignore[arg-type]
         (lambda: gdtof.light().photons(period_ns=100, seed=-1), "seed: -1 is impossible"),
-        (lambda: gdtof.frame(gdtof.Scene(), gdtof.Sensor()), "is none; give a Sensor, the name of a built-in one or a file"),  # type: ignore[arg-type]
-        (lambda: gdtof.drive(gdtof.Sensor()), "is none; give a Scene, the name of a built-in one or a file"),
-        (lambda: gdtof.frame(guide=3), "guide: 3 is none; give texts or Guides"),  # type: ignore[arg-type]
-        (lambda: gdtof.sweep(gdtof.Sensor()), "is none; give a file, or a dict of its sections"),
+        (lambda: gdtof.light(spads=-1), "spads: -1 is impossible"),
+        (lambda: gdtof.frame(gdtof.Scene(), gdtof.Sensor()), "sensor: Scene is no sensor; give a Sensor, the name of a built-in one or a file"),  # type: ignore[arg-type]
+        (lambda: gdtof.drive(gdtof.Sensor()), "scene: Sensor is no scene; give a Scene, the name of a built-in one or a file"),
+        (lambda: gdtof.frame(guide=3), "guide: 3 is no guide; give texts or Guides"),  # type: ignore[arg-type]
+        (lambda: gdtof.sweep(gdtof.Sensor()), "study: Sensor is no study; give a file, or a dict of its sections"),
         (lambda: gdtof.drive(segments=2.5), "segments: 2.5 is impossible; give a whole number, 0 to 4294967295"),  # type: ignore[arg-type]
         (lambda: gdtof.Sensor(rows=2.5), "rows = 2.5 is impossible; give a whole number, 1 to 256"),  # type: ignore[arg-type]
         (lambda: gdtof.Sensor.from_dict({"rows": True}), "sensor: rows = true is impossible; give a whole number, 1 to 256"),

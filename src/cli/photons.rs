@@ -181,10 +181,7 @@ pub(super) fn run(mut args: PhotonsArgs) -> anyhow::Result<()> {
     let kept = results.commit(report.configuration.clone())?;
     progress.finish_and_clear();
     notes(kept);
-    let is_cut = |pixel: &&u32| {
-        let light = source.facts(**pixel);
-        light.signal >= MOST_PER_ECHO || light.background_hz >= MOST_BACKGROUND_HZ
-    };
+    let is_cut = |pixel: &&u32| source.is_beyond_model(**pixel);
     let cut = pixels.iter().filter(is_cut).count();
     if cut > 0 {
         note(format_args!(

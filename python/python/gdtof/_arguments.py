@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from operator import index
 from os import PathLike
+from reprlib import repr as short
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,13 +22,13 @@ Policy: TypeAlias = str | Mapping[str, Any] | None
 
 def sensor_of(sensor: SensorLike) -> Sensor:
     if not isinstance(sensor, Sensor | str | PathLike | None):
-        raise InputError(f"sensor: {sensor!r} is none; give a Sensor, the name of a built-in one or a file")
+        raise InputError(f"sensor: {type(sensor).__name__} is no sensor; give a Sensor, the name of a built-in one or a file")
     return sensor if isinstance(sensor, Sensor) else Sensor(sensor)
 
 
 def scene_of(scene: SceneLike) -> Scene:
     if not isinstance(scene, Scene | str | PathLike | None):
-        raise InputError(f"scene: {scene!r} is none; give a Scene, the name of a built-in one or a file")
+        raise InputError(f"scene: {type(scene).__name__} is no scene; give a Scene, the name of a built-in one or a file")
     return scene if isinstance(scene, Scene) else Scene(scene)
 
 
@@ -39,7 +40,7 @@ def guide_of(guide: GuideLike) -> Guide | None:
     if isinstance(guide, np.ndarray):
         return Guide.from_map(guide)
     if not isinstance(guide, Iterable) or not all(isinstance(one, Guide | str) for one in guide):
-        raise InputError(f"guide: {guide!r} is none; give texts or Guides, or a map as an array of NumPy")
+        raise InputError(f"guide: {short(guide)} is no guide; give texts or Guides, or a map as an array of NumPy")
     return Guide(*guide)
 
 
@@ -49,7 +50,7 @@ def policy_of(windows: Policy) -> str:
         return windows or ""
 
     if not isinstance(windows, Mapping):
-        raise InputError(f"windows: {windows!r} is no policy; give a dict, or a text such as 'overlap=0.3'")
+        raise InputError(f"windows: {short(windows)} is no policy; give a dict, or a text such as 'overlap=0.3'")
 
     def text(value: Any) -> str:
         return str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
@@ -64,7 +65,7 @@ def count(name: str, value: int, largest: int = 2**32 - 1) -> int:
     except TypeError:
         number = -1
     if not 0 <= number <= largest:
-        raise InputError(f"{name}: {value!r} is impossible; give a whole number, 0 to {largest}")
+        raise InputError(f"{name}: {short(value)} is impossible; give a whole number, 0 to {largest}")
     return number
 
 
@@ -106,7 +107,7 @@ def numbers(values: ArrayLike) -> NDArray[np.float64]:
     try:
         masked = np.ma.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{values!r}: is no number; give numbers, in the unit of the argument's name") from None
+        raise InputError(f"{short(values)}: is no number; give numbers, in the unit of the argument's name") from None
     filled: NDArray[np.float64] = np.ma.filled(masked, np.nan)
     return filled
 

@@ -83,7 +83,7 @@ def sweep(
         What cannot be in the study, all at once with their lines. Why the first point has no result, if no point has one.
     """
     if not isinstance(study, dict | str | PathLike):
-        raise InputError(f"study: {study!r} is none; give a file, or a dict of its sections")
+        raise InputError(f"study: {type(study).__name__} is no study; give a file, or a dict of its sections")
     if isinstance(study, dict):
         # Where it would stand as a file.
         path, text = Path("study").absolute(), _gdtof.sweep_text(study)

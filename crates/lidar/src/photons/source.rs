@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::chip::Sensor;
 use crate::engine::{EngineError, refuse_floods};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent, SpadLayout, SpadModel, StreamConfig};
-use crate::scene::{GroundTruth, Scene};
+use crate::scene::{GroundTruth, Scene, is_beyond_model};
 use crate::system::TakenFrame;
 use crate::units::{Frequency, Time};
 
@@ -224,6 +224,12 @@ impl LightSource {
             arrival: mean.and_then(|mean| mean.arrival),
             truth_m: self.truth_m[pixel as usize],
         }
+    }
+
+    /// Whether a macropixel would get more light than is modelled.
+    pub fn is_beyond_model(&self, pixel: u32) -> bool {
+        let light = self.lights[pixel as usize].as_ref();
+        light.is_some_and(is_beyond_model)
     }
 
     /// Pulses of a macropixel to be expected in the exposure. Dead time is allowed for as far as it limits the rate of a SPAD; pulses

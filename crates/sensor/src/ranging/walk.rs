@@ -35,6 +35,7 @@ const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 
 /// Photons on a SPAD in a laser cycle from which on its first one tells the place: chosen. Of 256 depths of a sign with 156 of them in bright sun, 17 and 19 %
 /// were beyond five bounds of the likelihood's curvature at two of three distances.
+/// The fewest steps of time take such light for another one.
 const SHARP: f64 = 20.0;
 
 /// Share of the laser cycles that must reach a bin to tell the background: chosen.
@@ -71,7 +72,8 @@ pub enum WalkLeft {
     CutEcho,
     /// Bins are full, or light is so strong that its counts tell only the bin that it came in.
     ToABin,
-    /// Two different lights, more than a bin apart, give such counts; under a THRESHOLD, nearer ones too.
+    /// Two different lights, more than a bin apart, give such counts; under a THRESHOLD, nearer ones too. Or what is seen may be the end of an echo that
+    /// came before the window.
     Ambiguous,
     /// No most likely light was found.
     NotConverged,
@@ -128,9 +130,8 @@ pub struct WalkCorrection {
 pub struct CorrectedPeak {
     /// The most likely light; its position is without walk.
     pub light: EchoLight,
-    /// Cramér-Rao bound of the position, bins: the least standard deviation of any unbiased estimate from counts of this light. Under a
-    /// THRESHOLD at least the distance to other lights with which the counts are about as likely. Of short pulses, the standard deviation of
-    /// all places that explain the counts.
+    /// Cramér-Rao bound of the position, bins: the least standard deviation of any unbiased estimate from counts of this light. It is longer where
+    /// other lights explain the counts about as well. Of strong light and short pulses, the standard deviation of all places that explain them.
     pub bound_bins: f64,
 }
 
@@ -218,7 +219,7 @@ impl WalkCorrection {
     /// What is told of the lights that explain the counts, the most likely first.
     ///
     /// # Errors
-    /// As `widened`, and lights that explain the counts from places more than a bin apart.
+    /// As `widened`; lights that explain the counts from places more than a bin apart, or from before the window.
     fn corrected_peak(
         &self,
         wide: &Likelihood<'_>,

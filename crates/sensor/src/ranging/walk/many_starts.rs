@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   for each of many signals: the place at which the rising edge is as it was counted ─► the likeliest of these ─► fits ─► the best
+//!   no light explains the counts, or it is strong ─► the same again, in fine steps of time
 //! ```
 //!
 //! Strong light leaves the rising edge and little else, so that a weaker echo here and a stronger one there may explain the same counts.
@@ -26,8 +27,8 @@ const RIVAL: f64 = 1.0;
 /// and none is left out.
 const FAR: f64 = 30.0;
 
-/// Decades from signal to signal where each leads to a light of its own.
-const FINE: f64 = 0.1;
+/// Decades from signal to signal, and fits at most, where the edge is seen and few signals do not lead to all lights.
+const DENSE: (f64, usize) = (0.1, 4);
 
 impl WalkCorrection {
     /// Fits from many starts, the best first: for each of many signals the best place. Under a THRESHOLD the best alone.
@@ -42,7 +43,7 @@ impl WalkCorrection {
         let edge = self.rising_edge(likelihood, background_per_bin);
         let has_threshold = self.response.counting.threshold > 0;
         let follows_edge = edge.is_some_and(|(bin, _)| self.edge_is_seen(bin)) && !has_threshold;
-        let near = |steps: Steps, step: f64, fits: usize| {
+        let near = |steps: Steps, (decades, fits): (f64, usize)| {
             let places = |signal: f64| {
                 let places = self.places(edge, peak.peak_bin, signal).into_iter();
                 let light = |position_bins| EchoLight {
@@ -53,9 +54,8 @@ impl WalkCorrection {
                 };
                 places.map(light).collect()
             };
-            let mut starts = best_of_each(likelihood, steps, step, places);
-            // Those between lead to the same light.
-            if step == FINE {
+            let mut starts = best_of_each(likelihood, steps, decades, places);
+            if decades == DENSE.0 {
                 starts = least_of(&starts);
             }
             starts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -67,24 +67,20 @@ impl WalkCorrection {
             if has_threshold { near } else { likely(near) }
         };
         // Where light makes bins count less, too, each light has its own places.
-        let (step, most_fits) = match edge {
-            Some(_) if follows_edge && self.has_short_pulses() => (FINE, 4),
+        let signals = match edge {
+            Some(_) if follows_edge && self.has_short_pulses() => DENSE,
             Some(_) if follows_edge => (0.4, 2),
             // With a THRESHOLD few bins count, and several lights may explain them: with 8 fits for 24, one more depth of 512 was a hundredth of its bound beside.
             Some(_) if has_threshold => (0.2, 8),
             Some(_) => (0.2, 24),
             None => (0.2, 8),
         };
-        let mut fits = likelihood.refined_each(&near(Steps::Coarse, step, most_fits));
+        let mut fits = likelihood.refined_each(&near(Steps::Coarse, signals));
         // The fewest steps take strong light for some other.
         let is_told = |fit: &Fit| fit.explains() && !self.is_sharp(fit);
         if !has_threshold && !fits.iter().any(is_told) {
-            let (step, most_fits) = if follows_edge {
-                (FINE, 4)
-            } else {
-                (step, most_fits)
-            };
-            for fit in near(Steps::Fine, step, most_fits) {
+            let signals = if follows_edge { DENSE } else { signals };
+            for fit in near(Steps::Fine, signals) {
                 add_new(&mut fits, fit);
             }
             fits = likely(fits);
@@ -164,11 +160,11 @@ impl WalkCorrection {
 fn best_of_each(
     likelihood: &Likelihood<'_>,
     steps: Steps,
-    step: f64,
+    decades: f64,
     places: impl Fn(f64) -> Vec<EchoLight>,
 ) -> Vec<(f64, EchoLight)> {
-    let numbers = (-0.6 / step) as i32..=(4.0 / step) as i32;
-    let signals = numbers.map(|number| libm::pow(10f64, step * f64::from(number)));
+    let numbers = (-0.6 / decades) as i32..=(4.0 / decades) as i32;
+    let signals = numbers.map(|number| libm::pow(10f64, decades * f64::from(number)));
     let of_each: Vec<Vec<EchoLight>> = signals.map(places).collect();
     let mut deviances = likelihood.deviances(&of_each.concat(), steps).into_iter();
     let best_of = |lights: &Vec<EchoLight>| {
