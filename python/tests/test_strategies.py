@@ -1,5 +1,7 @@
 """Properties of the chip, in random sensors and exposures."""
 
+import random
+
 import gdtof
 import numpy as np
 import pytest
@@ -56,5 +58,6 @@ def test_a_wrong_property_is_found_and_shrinks_to_one_photon() -> None:
         exposures(simple),
         lambda exposure: exposure.replay("window").histograms.sum() > 0,
         settings=settings(max_examples=2000, deadline=None, database=None),
+        random=random.Random(1),
     )
     assert len(found.time_fs) == 1 and found.laser_cycles <= 2, found
